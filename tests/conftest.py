@@ -54,7 +54,7 @@ def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
-    """A run with skips is not a pass to ctest, which tells its exit status by LEVER_SKIPPED_STATUS."""
+    """Report a run with skips to ctest as no pass, by the exit status LEVER_SKIPPED_STATUS."""
     terminal = session.config.pluginmanager.get_plugin("terminalreporter")
     if exitstatus == pytest.ExitCode.OK and terminal is not None and terminal.stats.get("skipped"):
         session.exitstatus = int(os.environ.get("LEVER_SKIPPED_STATUS", exitstatus))
@@ -62,13 +62,13 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 
 @pytest.fixture(scope="session")
 def root() -> Path:
-    """The source tree."""
+    """Return the source tree."""
     return ROOT
 
 
 @pytest.fixture(scope="session")
 def build_dir() -> Path:
-    """The CMake build tree: lever_can, firmware/liblever_cdkf.so, venv/ … are in it."""
+    """Return the CMake build tree: lever_can, firmware/liblever_cdkf.so, venv/ … are in it."""
     return Path(os.environ.get("LEVER_BUILD_DIR", ROOT / "build"))
 
 
@@ -89,11 +89,11 @@ def built(build_dir: Path) -> Built:
 
 @pytest.fixture(scope="session")
 def can_image(built: Built) -> Path:
-    """The image for the STM32F405 whose frames travel over bxCAN; .bin, .hex and .map are beside it."""
+    """Return the image for the STM32F405 whose frames travel over bxCAN; .bin, .hex and .map are beside it."""
     return built("stm32f4/lever_stm32f4_can.elf", "build.stm32f4")
 
 
 @pytest.fixture(scope="session")
 def slcan_image(built: Built) -> Path:
-    """The image whose frames travel as SLCAN over USART1; .bin, .hex and .map are beside it."""
+    """Return the image whose frames travel as SLCAN over USART1; .bin, .hex and .map are beside it."""
     return built("stm32f4/lever_stm32f4_slcan.elf", "build.stm32f4")

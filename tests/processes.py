@@ -17,7 +17,7 @@ PATIENCE = 120.0
 
 
 def lever(*arguments: str | Path) -> str:
-    """What the command prints when it is run in this process, where Python need not start first; it must do."""
+    """Return what the command prints when it is run in this process, where Python need not start first; it must do."""
     output, errors = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
         status = cli.main([str(argument) for argument in arguments])

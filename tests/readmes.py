@@ -18,14 +18,14 @@ MF4 is written, for which much is imported."""
 
 
 def blocks(readme: Path, language: str) -> dict[int, str]:
-    """The content of each block of a language, by the line that it begins at."""
+    """Return the content of each block of a language, by the line that it begins at."""
     text = readme.read_text(encoding="utf-8")
     fenced = re.compile(rf"^```{language}\n(.*?)^```", re.MULTILINE | re.DOTALL)
     return {text.count("\n", 0, match.start()) + 1: match[1] for match in fenced.finditer(text)}
 
 
 def lever_commands(script: str) -> list[list[str]]:
-    """The arguments of each call of `lever` in lines of a shell."""
+    """Return the arguments of each call of `lever` in lines of a shell."""
     commands: list[list[str]] = []
     for line in script.replace("\\\n", " ").splitlines():
         commands.append([])

@@ -24,7 +24,7 @@ SIZE = (1280, 700)  # [pixels]
 
 
 def browse(url: str, *options: str) -> subprocess.CompletedProcess[str]:
-    """Opens `url` in a headless browser that keeps and fetches nothing. Raises LeverError when there is none."""
+    """Open `url` in a headless browser that keeps and fetches nothing. Raise LeverError when there is none."""
     browser = next((path for name in BROWSERS if (path := shutil.which(name))), None)
     if browser is None:
         raise LeverError(f"none of {', '.join(BROWSERS)} is on the PATH: apt-get install chromium")
@@ -34,7 +34,7 @@ def browse(url: str, *options: str) -> subprocess.CompletedProcess[str]:
 
 
 def write_picture(report: str | os.PathLike[str], path: str | os.PathLike[str]) -> None:
-    """Writes the PNG. Raises LeverError when it cannot."""
+    """Write the PNG. Raise LeverError when it cannot."""
     page, final = Path(report).resolve(), Path(path).resolve()
     if not page.is_file():
         raise LeverError(f"{report}: no such report; `lever demo` makes one")

@@ -100,7 +100,7 @@ class _Commands(argparse._SubParsersAction):  # type: ignore[type-arg]  # generi
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Runs a command line and returns its exit status: 0 only when all went well."""
+    """Run a command line and return its exit status: 0 only when all went well."""
     if not _has_streams():
         return 2
     hide_mf4(sys.argv[1:] if argv is None else argv)
@@ -132,7 +132,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _has_streams() -> bool:
-    """Standard error and input that are closed are as /dev/null; without a standard output nothing is worth running."""
+    """Return standard error and input that are closed are as /dev/null; without a standard output nothing is worth
+    running."""
     for name, mode in (("stdin", "r"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  for the life of the process
@@ -155,14 +156,14 @@ def _check_json(args: argparse.Namespace) -> None:
 
 
 def _said(error: Exception) -> str:
-    """Of an error of the system that names no file: of standard output, where it is full."""
+    """Return the said of an error of the system that names no file: of standard output, where it is full."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EFBIG) and error.filename is None:
         return f"cannot write standard output: {error.strerror}"
     return str(error)
 
 
 def _expected() -> tuple[type[Exception], ...]:
-    """Errors that are printed without a traceback."""
+    """Return errors that are printed without a traceback."""
     can = sys.modules.get("can")
     return (LeverError, OSError) if can is None else (LeverError, OSError, can.CanError)
 

@@ -7,6 +7,6 @@ MESSAGE = "lever: interrupted"
 
 
 def exit_at_once(*_: object) -> None:
-    """A signal handler for as long as there is nothing to clean up."""
+    """Handle a signal for as long as there is nothing to clean up."""
     os.write(2, f"{MESSAGE}\n".encode())
     os._exit(INTERRUPTED)

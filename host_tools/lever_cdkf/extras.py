@@ -32,7 +32,8 @@ _FILES = {
 
 
 def missing(extra: str, *packages: str) -> str:
-    """Which packages of an extra, or of these alone, are not installed, and how to get them; empty if all are."""
+    """Return which packages of an extra, or of these alone, are not installed, and how to get them; empty if all
+    are."""
     needed = packages or PACKAGES[extra]
     if "asammdf" in needed:
         reveal_mf4()
@@ -41,12 +42,12 @@ def missing(extra: str, *packages: str) -> str:
 
 
 def pip_install(requirement: str) -> str:
-    """The command that installs it where this Python finds it, whatever is on PATH."""
+    """Return the command that installs it where this Python finds it, whatever is on PATH."""
     return f'{shlex.quote(sys.executable)} -m pip install "{requirement}"'
 
 
 def require(extra: str, *packages: str) -> None:
-    """Raises LeverError where an extra, or these of its packages, are missing."""
+    """Raise LeverError where an extra, or these of its packages, are missing."""
     if reason := missing(extra, *packages):
         raise LeverError(reason)
 
@@ -57,20 +58,20 @@ def missing_of_file(name: str) -> str:
 
 
 def require_for_file(name: str) -> None:
-    """Raises LeverError where a file of a run needs an extra that is missing."""
+    """Raise LeverError where a file of a run needs an extra that is missing."""
     if reason := missing_of_file(name):
         raise LeverError(reason)
 
 
 def warn_of_left_out(files: Iterable[str]) -> None:
-    """Says on standard error which of a run's files will not be written."""
+    """Say on standard error which of a run's files will not be written."""
     for name in files:
         if reason := missing_of_file(name):
             print(f"lever: warning: no {name}: {reason}", file=sys.stderr)
 
 
 def hide_mf4(arguments: Sequence[str]) -> None:
-    """Hides asammdf, which python-can imports and which takes a second, from a command that reads no MF4 log.
+    """Hide asammdf, which python-can imports and which takes a second, from a command that reads no MF4 log.
 
     For the process of the command `lever` alone; a program that imports this package has python-can whole.
     """
@@ -79,7 +80,7 @@ def hide_mf4(arguments: Sequence[str]) -> None:
 
 
 def mf4_is_hidden() -> bool:
-    """Whether hide_mf4() holds."""
+    """Return whether hide_mf4() holds."""
     return sys.modules.get("asammdf", sys) is None
 
 

@@ -23,7 +23,8 @@ LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
 
 
 def native_file(name: str) -> Path:
-    """The path of `name` (shared library, its declarations, lever.dbc), which installing has put into `_native`."""
+    """Return the path of `name` (shared library, its declarations, lever.dbc), which installing has put into
+    `_native`."""
     folders = [Path(folder) for folder in os.environ.get(LIBRARY_DIR, "").split(os.pathsep) if folder]
     folders += [Path(folder) / "_native" for folder in lever_cdkf.__path__]  # two, if the install is editable
     for folder in folders:
@@ -34,22 +35,22 @@ def native_file(name: str) -> Path:
 
 
 def shared_library(name: str) -> str:
-    """The file name of a shared library on this system."""
+    """Return the file name of a shared library on this system."""
     return {"darwin": f"lib{name}.dylib", "win32": f"{name}.dll"}.get(sys.platform, f"lib{name}.so")
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> None:
-    """Writes `text` as UTF-8, as whole() does. Raises LeverError."""
+    """Write `text` as UTF-8, as whole() does. Raise LeverError."""
     write_texts({Path(path): text})
 
 
 def json_text(content: Any) -> str:
-    """A file of JSON. Raises ValueError for NaN and infinity, which JSON does not have."""
+    """Return a file of JSON. Raise ValueError for NaN and infinity, which JSON does not have."""
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def write_texts(texts: Mapping[Path, str]) -> None:
-    """Writes files, all or none, but for what fails when all are written. Raises LeverError."""
+    """Write files, all or none, but for what fails when all are written. Raise LeverError."""
     with ExitStack() as stack:
         for path, text in texts.items():
             target = stack.enter_context(whole(path))
@@ -58,7 +59,7 @@ def write_texts(texts: Mapping[Path, str]) -> None:
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raises LeverError where whole() could not write: before work that would be lost."""
+    """Raise LeverError where whole() could not write: before work that would be lost."""
     final = Path(path)
     if final.is_dir():
         raise LeverError(f"cannot write {path}: it is a folder")
@@ -69,7 +70,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 @contextmanager
 def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Where to write so that the file `path` holds either all of it or what it held before. Raises LeverError.
+    """Where to write so that the file `path` holds either all of it or what it held before. Raise LeverError.
 
     What is not a file (/dev/stdout, a named pipe) is written to as it is.
     """
@@ -90,7 +91,7 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 
 def make_folder(folder: Path) -> None:
-    """Makes a folder and those above it, where they are not there yet. Raises LeverError."""
+    """Make a folder and those above it, where they are not there yet. Raise LeverError."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -99,7 +100,7 @@ def make_folder(folder: Path) -> None:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Raises LeverError, which names `path`, for an OSError inside."""
+    """Raise LeverError, which names `path`, for an OSError inside."""
     try:
         yield
     except OSError as error:
@@ -107,7 +108,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def check_not_input(path: str | os.PathLike[str] | None, inputs: Iterable[str | os.PathLike[str]]) -> None:
-    """Raises LeverError when writing to `path` would overwrite one of `inputs`."""
+    """Raise LeverError when writing to `path` would overwrite one of `inputs`."""
     with suppress(OSError):  # one of them is not there
         if path is not None and any(os.path.samefile(path, each) for each in inputs if os.path.exists(each)):
             raise LeverError(f"cannot write {path}: it is an input: choose another folder or name")
@@ -118,8 +119,8 @@ class Outputs:
     whole. A context manager; without finish() it leaves what was there before, and nothing else."""
 
     def __init__(self, folder: Path, inputs: Iterable[str | os.PathLike[str]] = (), names: Iterable[str] = ()) -> None:
-        """`inputs` of the command are not written over; of `names`, finish() takes away what is of an earlier run and
-        not made now."""
+        """Protect `inputs` of the command from being written over; finish() removes the files among `names` that an
+        earlier run has left and this one has not made."""
         self._folder = folder
         self._may_be_there = tuple(names)
         self._unfinished = folder
@@ -138,7 +139,7 @@ class Outputs:
         shutil.rmtree(self._unfinished, ignore_errors=True)
 
     def path(self, name: str) -> Path:
-        """Where to write the file `name`. Raises LeverError when in its place is an input, or a folder."""
+        """Where to write the file `name`. Raise LeverError when in its place is an input, or a folder."""
         final = self._folder / name
         check_not_input(final, self._inputs)
         if final.is_dir():
@@ -151,7 +152,7 @@ class Outputs:
         return [self._unfinished / name for name in names if name in self._names]
 
     def finish(self) -> None:
-        """Puts the files into their place; the last one asked for is there only when all are. Raises LeverError."""
+        """Put the files into their place; the last one asked for is there only when all are. Raise LeverError."""
         interrupts.check()
         with writing(self._folder):
             (self._folder / self._names[-1]).unlink(missing_ok=True)

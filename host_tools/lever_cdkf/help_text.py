@@ -50,7 +50,7 @@ def _command(text: str, width: int) -> Iterator[str]:
 
 
 def _joined(text: str) -> list[str]:
-    """The lines of a text: those of a paragraph as one, and those of an entry of a list."""
+    """Return the lines of a text: those of a paragraph as one, and those of an entry of a list."""
     parts: list[str] = []
     for line in text.split("\n"):
         indent = len(line) - len(line.lstrip())

@@ -57,7 +57,7 @@ def _hear(_number: int, _frame: object) -> None:
 
 
 def check() -> None:
-    """Raises the KeyboardInterrupt that has come, if it was lost."""
+    """Raise the KeyboardInterrupt that has come, if it was lost."""
     if _came:
         raise KeyboardInterrupt
 
@@ -81,7 +81,7 @@ def in_processes(function: Callable[[_Task], _Done], tasks: Sequence[_Task], job
 
 
 def worker_pool(processes: int) -> Pool:
-    """Processes that leave Ctrl-C to this one, from their first moment on, and hide what packages this one hides."""
+    """Process that leave Ctrl-C to this one, from their first moment on, and hide what packages this one hides."""
     import multiprocessing
 
     context = multiprocessing.get_context("spawn")
@@ -97,7 +97,7 @@ def _begin(without_mf4: bool) -> None:
 
 @contextmanager
 def masked() -> Iterator[None]:
-    """Processes that this thread, or a new one, starts inside leave Ctrl-C to this one. Not on Windows."""
+    """Process that this thread, or a new one, starts inside leave Ctrl-C to this one. Not on Windows."""
     if sys.platform == "win32":
         yield
         return

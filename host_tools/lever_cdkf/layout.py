@@ -13,7 +13,7 @@ _INDENT = "    "
 
 
 def terminal_width() -> int:
-    """Columns of standard output. Without a limit where it is no terminal, so that a row is a line for `grep`.
+    """Return columns of standard output. Without a limit where it is no terminal, so that a row is a line for `grep`.
 
     The environment variable COLUMNS sets it for both.
     """
@@ -23,7 +23,7 @@ def terminal_width() -> int:
 
 
 def text_width(text: str) -> int:
-    """Columns that a text takes: none for a combining dot, two for a wide letter."""
+    """Return columns that a text takes: none for a combining dot, two for a wide letter."""
     return len(text) if text.isascii() else sum(map(_letter_width, text))
 
 
@@ -32,12 +32,12 @@ def _letter_width(letter: str) -> int:
 
 
 def say(text: str) -> None:
-    """Prints a sentence, wrapped to the terminal."""
+    """Print a sentence, wrapped to the terminal."""
     print("\n".join(wrapped(text, terminal_width())))
 
 
 def wrapped(text: str, width: int) -> list[str]:
-    """Lines of a text, broken at spaces, but not inside a unit. A longer word has a line of its own."""
+    """Return lines of a text, broken at spaces, but not inside a unit. A longer word has a line of its own."""
     if text_width(text) <= width:
         return [text]
     lines: list[str] = []
@@ -50,12 +50,12 @@ def wrapped(text: str, width: int) -> list[str]:
 
 
 def words(text: str) -> list[str]:
-    """What is never broken."""
+    """Return what is never broken."""
     return re.findall(r"[^ \[]*\[[^]]*\][^ ]*|\d+ %[^ ]*|[^ ]+", text)
 
 
 def command_lines(command: str, width: int) -> list[str]:
-    """A command line, continued by backslashes where it is too long; options keep their values."""
+    """Return a command line, continued by backslashes where it is too long; options keep their values."""
     lines: list[str] = []
     word = r"""(?:"[^"]*"|'[^']*'|[^\s"'])+"""
     for part in re.findall(rf"-\S+ (?!-){word}|{word}", command):

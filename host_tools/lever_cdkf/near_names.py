@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 
 def near_names(name: str, known: Iterable[str], most: int = 3) -> list[str]:
-    """The known names that are like it, the nearest first, whatever their case."""
+    """Return the known names that are like it, the nearest first, whatever their case."""
     from difflib import get_close_matches
 
     by_lower = {each.lower(): each for each in known}
@@ -14,6 +14,6 @@ def near_names(name: str, known: Iterable[str], most: int = 3) -> list[str]:
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
-    """A question after the nearest name, or what is said where none is near."""
+    """Return a question after the nearest name, or what is said where none is near."""
     near = near_names(name, known, 1)
     return f"did you mean {near[0]}?" if near else otherwise

@@ -44,7 +44,7 @@ class Provenance:
     """SHA-256 of those files beside this one that cannot hold their own provenance."""
 
     def moment(self) -> datetime:
-        """`created` as a date."""
+        """Return `created` as a date."""
         return datetime.strptime(self.created, _DATE).replace(tzinfo=timezone.utc)
 
     def with_outputs(self, paths: Iterable[Path]) -> Provenance:
@@ -56,7 +56,7 @@ class Provenance:
         return {"software": SOFTWARE, **asdict(self)}
 
     def text(self) -> str:
-        """The content of provenance.json."""
+        """Return the content of provenance.json."""
         return json.dumps(self.content(), indent=2, ensure_ascii=False) + "\n"
 
     def comment(self) -> str:
@@ -66,14 +66,15 @@ class Provenance:
         return "".join(f"# {line}\n" for line in (generator, self.command, *hashes))
 
     def properties(self, **more: Any) -> dict[str, str]:
-        """Name and text of each property, for formats that keep pairs of text; `more` are further ones, as JSON."""
+        """Return name and text of each property, for formats that keep pairs of text; `more` are further ones, as
+        JSON."""
         given = {name: value for name, value in asdict(self).items() if value}
         return {"software": SOFTWARE} | {name: _as_text(value) for name, value in (given | more).items()}
 
 
 def provenance(inputs: Iterable[str | os.PathLike[str]] = ()) -> Provenance:
-    """Of this process, now; `inputs` are the files that it reads. Raises LeverError for a SOURCE_DATE_EPOCH that is no
-    number."""
+    """Return the provenance of this process, now; `inputs` are the files that it reads. Raise LeverError for a
+    SOURCE_DATE_EPOCH that is no number."""
     return Provenance(
         version=version(),
         revision=revision(),
@@ -99,7 +100,7 @@ def with_provenance(page: str, origin: Provenance | None) -> str:
 
 
 def version() -> str:
-    """Of the installed package."""
+    """Return the version of the installed package."""
     try:
         return importlib.metadata.version(SOFTWARE)
     except importlib.metadata.PackageNotFoundError:
@@ -174,7 +175,7 @@ def sha256(path: str | os.PathLike[str]) -> str | None:
 
 
 def printable(text: str) -> str:
-    """A name as every format can hold it: bytes that are no UTF-8, and control characters, as \\x07."""
+    """Return a name as every format can hold it: bytes that are no UTF-8, and control characters, as \x07."""
     whole = text.encode("utf-8", "backslashreplace").decode("utf-8")
     return re.sub(r"[\x00-\x1f\x7f]", lambda match: f"\\x{ord(match[0]):02x}", whole)
 

@@ -25,7 +25,7 @@ class Signal(Protocol):
 
 
 def in_degrees(theta: Signal, theta_dot: Signal) -> tuple[str, str] | None:
-    """Which of the two looks like degrees where the other is in radians, and why."""
+    """Return which of the two looks like degrees where the other is in radians, and why."""
     ratio = abs(slope_ratio(theta, theta_dot))
     for name, (low, high) in _IN_DEGREES.items():
         if low < ratio < high:
@@ -43,12 +43,13 @@ def together(one: Signal, other: Signal) -> tuple[FloatArray, FloatArray]:
 
 
 def slope_likeness(angle: Signal, rate: Signal) -> float:
-    """Correlation of the slope of an angle with a rate; 0 where there is too little of both."""
+    """Return correlation of the slope of an angle with a rate; 0 where there is too little of both."""
     return _likeness(*_slope_and_rate(angle, rate))
 
 
 def slope_ratio(angle: Signal, rate: Signal) -> float:
-    """A rate as a multiple of the slope of the angle, negative where their signs differ; 0 where they are not alike."""
+    """Return a rate as a multiple of the slope of the angle, negative where their signs differ; 0 where they are not
+    alike."""
     slope, value = _slope_and_rate(angle, rate)
     likeness = _likeness(slope, value)
     return float(np.sign(likeness) * np.std(value) / np.std(slope)) if abs(likeness) > _ALIKE else 0.0
@@ -59,7 +60,7 @@ def _likeness(slope: FloatArray, rate: FloatArray) -> float:
 
 
 def _slope_and_rate(angle: Signal, rate: Signal) -> tuple[FloatArray, FloatArray]:
-    """Both at the same times, as far as both are known; empty where that is too little."""
+    """Return both at the same times, as far as both are known; empty where that is too little."""
     angles, rates = together(angle, rate)
     slope, value = (angles[2:] - angles[:-2]) / (2.0 * STEP), rates[1:-1]
     both = np.isfinite(slope) & np.isfinite(value)
@@ -69,7 +70,7 @@ def _slope_and_rate(angle: Signal, rate: Signal) -> tuple[FloatArray, FloatArray
 
 
 def _means(signal: Signal, edges: FloatArray) -> FloatArray:
-    """Means between the edges [s]; NaN where there is no value."""
+    """Return means between the edges [s]; NaN where there is no value."""
     if len(edges) < 2:
         return np.zeros(0)
     valid = np.isfinite(signal.values)

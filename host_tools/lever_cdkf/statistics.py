@@ -8,7 +8,7 @@ from statistics import NormalDist
 
 
 def normal_quantile(probability: float) -> float:
-    """What a normal deviate stays below with this probability."""
+    """Return what a normal deviate stays below with this probability."""
     return NormalDist().inv_cdf(probability)
 
 
@@ -18,7 +18,7 @@ NORMAL_95 = normal_quantile(0.975)
 
 @cache
 def chi_square_quantile(probability: float, freedom: int) -> float:
-    """What chi-square with so many degrees of freedom stays below with this probability."""
+    """Return what chi-square with so many degrees of freedom stays below with this probability."""
     low, high = 0.0, float(freedom)
     while _chi_square_exceeds(high, freedom) > 1.0 - probability:
         low, high = high, 2.0 * high
@@ -32,12 +32,13 @@ def chi_square_quantile(probability: float, freedom: int) -> float:
 
 
 def chi_square_band(freedom: int) -> tuple[float, float]:
-    """The middle 95 % of chi-square."""
+    """Return the middle 95 % of chi-square."""
     return chi_square_quantile(0.025, freedom), chi_square_quantile(0.975, freedom)
 
 
 def _chi_square_exceeds(x: float, freedom: int) -> float:
-    """Probability that chi-square is above x > 0: a finite sum (M. Abramowitz, I. A. Stegun, 26.4.4 and 26.4.5)."""
+    """Return probability that chi-square is above x > 0: a finite sum (M. Abramowitz, I. A. Stegun, 26.4.4 and
+    26.4.5)."""
     half, power = 0.5 * x, 0.5 * freedom - 1.0
     term = math.exp(power * math.log(half) - half - math.lgamma(power + 1.0))
     total = math.erfc(math.sqrt(half)) if freedom % 2 else 0.0

@@ -41,7 +41,7 @@ class Column:
 
 
 def table_lines(columns: Sequence[Column], width: int) -> list[str]:
-    """A table in `width` columns.
+    """Return a table in `width` columns.
 
     What is too wide has its names and texts wrapped; then texts at the end stand beneath their rows; then it is folded
     into blocks that repeat the first column; and at last each row stands upright.
@@ -61,7 +61,7 @@ def table_lines(columns: Sequence[Column], width: int) -> list[str]:
 
 
 def upright_lines(columns: Sequence[Column], row: int, width: int) -> Iterator[str]:
-    """A row as lines of name, value and unit, which is in brackets at the end of the name."""
+    """Yield a row as lines of name, value and unit, which is in brackets at the end of the name."""
     named = [re.fullmatch(r"(.*?)(?: \[(.*)\])?", column.name) for column in columns]
     entries = [
         (match[1], f"{cell} {match[2]}" if cell and match[2] not in (None, "1") else cell or "-")
@@ -81,7 +81,7 @@ def upright_lines(columns: Sequence[Column], row: int, width: int) -> Iterator[s
 
 
 def _widths(columns: Sequence[Column], width: int) -> list[int] | None:
-    """Of the columns beside each other; None if there is no room for them."""
+    """Return the widths of the columns beside each other; None if there is no room for them."""
     gaps = 2 * (len(columns) - 1)
     widths = [column.least for column in columns]
     if sum(widths) + gaps > width:
@@ -117,13 +117,13 @@ def _row(cells: Sequence[Sequence[str]], columns: Sequence[Column], widths: Sequ
 
 
 def _keys(columns: Sequence[Column]) -> int:
-    """How many columns at the left tell the rows apart; 1 if that takes more than two columns."""
+    """Return how many columns at the left tell the rows apart; 1 if that takes more than two columns."""
     first, *others = (column.cells for column in columns[:2])
     return 2 if len(set(first)) < len(first) == len(set(zip(first, *others, strict=True))) else 1
 
 
 def _blocks(keys: Sequence[Column], others: Sequence[Column], width: int) -> list[list[Column]]:
-    """Columns that fit beside each other, each block with the keys in front; none if one alone does not."""
+    """Return columns that fit beside each other, each block with the keys in front; none if one alone does not."""
     blocks: list[list[Column]] = []
     for column in others:
         if blocks and _widths([*blocks[-1], column], width):

@@ -19,7 +19,7 @@ Tables = Mapping[str, Sequence[Row]]
 
 
 def add_json_option(parser: argparse._ActionsContainer) -> None:
-    """Gives a command the option --json FILE, for print_tables()."""
+    """Give a command the option --json FILE, for print_tables()."""
     parser.add_argument(
         "--json", metavar="FILE", help="also write what is printed to FILE, as JSON: {title: [row, …], provenance: …}"
     )
@@ -28,8 +28,8 @@ def add_json_option(parser: argparse._ActionsContainer) -> None:
 def print_tables(
     tables: Tables, json_file: str | None = None, digits: int = 4, inputs: Iterable[str | os.PathLike[str]] = ()
 ) -> None:
-    """Prints the tables, numbers with so many `digits`; with `json_file` also writes them there, and that they are from
-    the files `inputs`. Raises LeverError.
+    """Print the tables, numbers with so many `digits`; with `json_file` also writes them there, and that they are from
+    the files `inputs`. Raise LeverError.
 
     On a terminal they fit its width, and a table of one row stands upright; elsewhere a row is a line.
     """
@@ -59,7 +59,7 @@ def _columns(rows: Sequence[Row], digits: int) -> list[Column]:
 
 
 def write_json(path: str, tables: Tables, inputs: Iterable[str | os.PathLike[str]] = ()) -> None:
-    """Writes the tables as {title: [row, …]}, and their provenance; NaN and infinity become null. Raises LeverError."""
+    """Write the tables as {title: [row, …]}, and their provenance; NaN and infinity become null. Raise LeverError."""
     rows = {title: [_json_row(row) for row in rows] for title, rows in tables.items()}
     content = {**rows, "provenance": provenance(inputs).content()}
     write_text(path, json_text(content))

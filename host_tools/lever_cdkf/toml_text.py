@@ -26,7 +26,7 @@ class NestedError(TomlError):
 
 
 def parse(content: bytes) -> dict[str, Any]:
-    """The table that a file holds. Raises TomlError."""
+    """Return the table that a file holds. Raise TomlError."""
     try:
         table = tomllib.loads(content.decode("utf-8"))
     except ValueError as error:  # also of text that is not UTF-8, and of a whole number with too many digits

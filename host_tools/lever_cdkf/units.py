@@ -25,20 +25,20 @@ class UnitError(LeverError):
 
 @cache
 def spellings(unit: str) -> dict[str, float]:
-    """What may be written for a `unit`, with the factor to it."""
+    """Return what may be written for a `unit`, with the factor to it."""
     table = native_file("lever_units.def").read_text(encoding="ascii")
     rows = re.findall(r'^LEVER_UNIT\("(.*)", "(.*)", (.*)\)$', table, re.MULTILINE)
     return {spelling: float(factor) for of, spelling, factor in rows if of == unit}
 
 
 def split(text: str) -> tuple[str, str] | None:
-    """Number and unit of a quantity, "" without one; None where it begins with no number."""
+    """Return number and unit of a quantity, "" without one; None where it begins with no number."""
     match = _QUANTITY.fullmatch(text)
     return match and (match[1], match[2])
 
 
 def number_of(text: str) -> float:
-    """A number without a unit; NaN for what is none, or not finite."""
+    """Return a number without a unit; NaN for what is none, or not finite."""
     parts = split(text)
     number = float(parts[0]) if parts and not parts[1] else math.nan
     return number if math.isfinite(number) else math.nan

@@ -38,7 +38,7 @@ class Place:
     signal: str = "1"
 
     def at(self, key: str | int, signal: str | None = None) -> Place:
-        """The place of `key` (name or list index) inside this one."""
+        """Return the place of `key` (name or list index) inside this one."""
         step = f"[{key}]" if isinstance(key, int) else f".{key}"
         path = f"{self.path}{step}".removeprefix(".")
         return Place(self.file, path, self.signal if signal is None else signal)
@@ -57,12 +57,12 @@ class Shelf:
     folder: str = ""
 
     def names(self) -> list[str]:
-        """Of the files."""
+        """Return the names of the files."""
         names = (entry.name for entry in self._files().iterdir())
         return sorted(name.removesuffix(_ENDING) for name in names if name.endswith(_ENDING))
 
     def content(self, name_or_path: str) -> bytes:
-        """Of the file of that name or path (ending in .toml). Raises ScenarioError."""
+        """Return the content of the file of that name or path (ending in .toml). Raise ScenarioError."""
         if name_or_path.endswith(_ENDING):
             if not Path(name_or_path).is_file():
                 raise ScenarioError(f"{name_or_path}: no such file")
@@ -83,12 +83,12 @@ _ENDING = ".toml"
 
 
 def file_of(name_or_path: str) -> str:
-    """How errors call the file that Shelf.content() finds."""
+    """Return how errors call the file that Shelf.content() finds."""
     return name_or_path if name_or_path.endswith(_ENDING) else f"{name_or_path}{_ENDING}"
 
 
 def parse(content: bytes, file: str) -> dict[str, Any]:
-    """The table that a file holds. Raises ScenarioError."""
+    """Return the table that a file holds. Raise ScenarioError."""
     try:
         return toml_text.parse(content)
     except toml_text.TomlError as error:
@@ -96,8 +96,8 @@ def parse(content: bytes, file: str) -> dict[str, Any]:
 
 
 def value_of(written: str) -> Any:
-    """What KEY=VALUE of a command line gives: TOML when it is TOML, otherwise a string, so that a shell needs no second
-    quotes."""
+    """Return what KEY=VALUE of a command line gives: TOML when it is TOML, otherwise a string, so that a shell needs
+    no second quotes."""
     try:
         return toml_text.parse(f"value = {written}".encode())["value"]
     except toml_text.NestedError as error:
@@ -138,7 +138,7 @@ def read_quantity(unit: str, least: float = -math.inf, greatest: float = math.in
 
 
 def quantity(unit: str, default: Any = _REQUIRED, **limits: float) -> Any:
-    """A field that holds a number in the SI `unit`, written with a unit; `limits` as for read_quantity."""
+    """Return a field that holds a number in the SI `unit`, written with a unit; `limits` as for read_quantity."""
     return _field(read_quantity(unit, **limits), default)
 
 
@@ -154,7 +154,7 @@ def read_list(reader: Reader) -> Reader:
 
 
 def quantities(unit: str, **limits: float) -> Any:
-    """A field that holds a tuple of numbers in the SI `unit`."""
+    """Return a field that holds a tuple of numbers in the SI `unit`."""
     return _field(read_list(read_quantity(unit, **limits)), _REQUIRED)
 
 
@@ -170,17 +170,17 @@ def read_whole(least: int, greatest: int) -> Reader:
 
 
 def whole(default: Any = _REQUIRED, least: int = 0, greatest: int = 2**63 - 1) -> Any:
-    """A field that holds a whole number."""
+    """Return a field that holds a whole number."""
     return _field(read_whole(least, greatest), default)
 
 
 def wholes(least: int, greatest: int) -> Any:
-    """A field that holds a tuple of whole numbers."""
+    """Return a field that holds a tuple of whole numbers."""
     return _field(read_list(read_whole(least, greatest)), _REQUIRED)
 
 
 def text(default: Any = _REQUIRED) -> Any:
-    """A field that holds a string, folded onto one line."""
+    """Return a field that holds a string, folded onto one line."""
 
     def reader(value: Any, place: Place) -> str:
         if not isinstance(value, str):
@@ -191,7 +191,7 @@ def text(default: Any = _REQUIRED) -> Any:
 
 
 def choice(*options: str, default: Any = _REQUIRED) -> Any:
-    """A field that holds one of the strings `options`."""
+    """Return a field that holds one of the strings `options`."""
 
     def reader(value: Any, place: Place) -> str:
         if value not in options:
@@ -202,7 +202,7 @@ def choice(*options: str, default: Any = _REQUIRED) -> Any:
 
 
 def item(reader: Reader, signal: str | None = None, default: Any = _REQUIRED) -> Any:
-    """A field read by `reader`, in which SIGNAL means `signal`."""
+    """Return a field read by `reader`, in which SIGNAL means `signal`."""
 
     def item_reader(value: Any, place: Place) -> Any:
         return reader(value, dataclasses.replace(place, signal=signal or place.signal))
@@ -216,7 +216,8 @@ def read_table(kind: type[T]) -> Reader:
 
 
 def table(kind: type[T]) -> Any:
-    """A field that holds a nested table; a missing one is read as an empty one, so that its own defaults hold."""
+    """Return a field that holds a nested table; a missing one is read as an empty one, so that its own defaults
+    hold."""
     return dataclasses.field(default_factory=lambda: kind(), metadata={"read": read_table(kind)})
 
 
@@ -233,12 +234,12 @@ def read_kind(kinds: Mapping[str, type[Any]], key: str = "kind", default: str | 
 
 
 def tables(reader: Reader, signal: str | None = None) -> Any:
-    """A field that holds a tuple of tables, by default none."""
+    """Return a field that holds a tuple of tables, by default none."""
     return item(read_list(reader), signal, ())
 
 
 def read(kind: type[T], values: Any, place: Place) -> T:
-    """The dataclass `kind` from the table `values`. Raises ScenarioError."""
+    """Return the dataclass `kind` from the table `values`. Raise ScenarioError."""
     if not isinstance(values, dict):
         raise place.error(f"{values!r} is not a table")
     all_fields = dataclasses.fields(kind)  # type: ignore[arg-type]

@@ -27,7 +27,7 @@ Exit status: 0; 1 when a figure differs by more than one in its last digit; 2 wh
 
 
 def main() -> int:
-    """Compares, or with --accept writes the tables."""
+    """Compare, or with --accept write the tables."""
     parser = argparse.ArgumentParser(
         prog="python tests/accuracy", description=_DESCRIPTION, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -60,7 +60,7 @@ def _text(place: Place) -> str:
 
 
 def _texts() -> dict[Place, str]:
-    """The tables as they have to be."""
+    """Return the tables as they have to be."""
     jobs = os.cpu_count() or 1
     names = list(dict.fromkeys(name for table in tables.TABLES for name in table.scenarios))
     tasks = [seeds.Task(name, seed) for name in names for seed in range(1, tables.SEEDS + 1)]

@@ -140,7 +140,7 @@ COLUMNS = ("median", "worst", "worst flight", "all flights", "limit")
 
 
 def text(place: Place, rows: Rows) -> str:
-    """A table as Markdown."""
+    """Return a table as Markdown."""
     flights = rows[TABLES[place][0].condition]["runs"]
     return tables.markdown(
         (f"{flights} flights", *COLUMNS), [_cells(row, rows[row.condition]) for row in TABLES[place]]
@@ -162,7 +162,7 @@ def _cells(row: Row, measured: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def number(value: float | None) -> float:
-    """What JSON has none of is never reached."""
+    """Return what JSON has none of is never reached."""
     return float("inf") if value is None else value
 
 
@@ -179,7 +179,7 @@ def _read(path: Path) -> Iterable[Mapping[str, Any]]:
 
 
 def main() -> int:
-    """Compares, or with --accept writes the tables."""
+    """Compare, or with --accept write the tables."""
     parser = argparse.ArgumentParser(
         prog="python tests/accuracy/bounce.py",
         description=__doc__,

@@ -57,7 +57,7 @@ RELAXED = tables.Table(
 
 
 def relaxed() -> list[Row]:
-    """The row of the relaxed hand, as in the README's table of scenarios."""
+    """Return the row of the relaxed hand, as in the README's table of scenarios."""
     (name,) = RELAXED.scenarios
     tasks = [seeds.Task(name, seed) for seed in range(1, SEEDS + 1)]
     with Progress("paper") as progress:
@@ -80,13 +80,13 @@ TABLES: Mapping[Place, Callable[[], Sequence[Row]]] = {
 
 
 def text(rows: Sequence[Row]) -> str:
-    """A table as Markdown."""
+    """Return a table as Markdown."""
     cells = [tuple("–" if row.get(name) is None else str(row[name]) for name in rows[0]) for row in rows]
     return tables.markdown(tuple(rows[0]), cells)
 
 
 def main() -> int:
-    """Compares, or with --accept writes the tables."""
+    """Compare, or with --accept write the tables."""
     parser = argparse.ArgumentParser(
         prog="python tests/accuracy/paper.py",
         description=__doc__,

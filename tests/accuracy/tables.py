@@ -58,7 +58,7 @@ class Table:
 
 
 def markdown(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    """A table as Markdown."""
+    """Return a table as Markdown."""
     return "".join(f"| {' | '.join(row)} |\n" for row in (header, ("---",) * len(header), *rows))
 
 
@@ -115,18 +115,18 @@ TABLES = (
 
 
 def _percent(values: FloatArray, digits: int = 1) -> str:
-    """Median / largest."""
+    """Return median / largest."""
     return f"{_number(float(np.median(values)), digits)} / {_number(float(np.max(values)), digits)} %"
 
 
 def _covered(summaries: Sequence[SimulationSummary], key: str) -> str:
-    """All runs / worst run."""
+    """Return all runs / worst run."""
     covered = seeds.coverage(summaries, key)
     return f"{np.mean(covered):.0f} / {np.min(covered):.0f} %"
 
 
 def _seconds(times: FloatArray) -> str:
-    """Median / longest."""
+    """Return median / longest."""
     median, longest = float(np.median(times)), float(np.max(times))
     if math.isinf(median):
         return "never"
@@ -143,12 +143,12 @@ def _number(value: float, digits: int = 1) -> str:
 
 
 def written(text: str, place: Place) -> str:
-    """The table in the text of a README. Raises LeverError."""
+    """Return the table in the text of a README. Raise LeverError."""
     return _parts(text, place)[1]
 
 
 def replaced(text: str, place: Place, table: str) -> str:
-    """The text of a README with another table. Raises LeverError."""
+    """Return the text of a README with another table. Raise LeverError."""
     before, _, after = _parts(text, place)
     return before + table + after
 
@@ -163,7 +163,7 @@ def _parts(text: str, place: Place) -> tuple[str, str, str]:
 
 
 def rows(table: str) -> list[list[str]]:
-    """The cells of a table, with its header and the line below that."""
+    """Return the cells of a table, with its header and the line below that."""
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
 
 

@@ -20,7 +20,7 @@ def written(root: Path, place: Place) -> list[list[str]]:
 
 
 def pair(cell: str) -> tuple[float, float]:
-    """The two numbers of "0.8 / 1.2 %"; "60 s / never" has the second infinite."""
+    """Return the two numbers of "0.8 / 1.2 %"; "60 s / never" has the second infinite."""
     first, second = re.findall(r"\d+(?:\.\d+)?|never", cell)
     return float(first), float(second.replace("never", "inf"))
 

@@ -58,12 +58,12 @@ class Task:
 
 
 def tasks(count: int) -> list[Task]:
-    """Both kinds of logs with seeds from 1 on."""
+    """Return both kinds of logs with seeds from 1 on."""
     return [Task(changing, seed) for changing in (False, True) for seed in range(1, count + 1)]
 
 
 def search(task: Task) -> list[Tuned]:
-    """What is found in the log of `task`. The search starts at the defaults: half to twice the truth."""
+    """Return what is found in the log of `task`. The search starts at the defaults: half to twice the truth."""
     overrides = [f"duration={80 if task.changing else 40} s", "limits={}", f"seed={task.seed}", *_SENSORS]
     samples = _recorded([*overrides, *(_CHANGING if task.changing else ())])
     if task.changing:
@@ -74,7 +74,7 @@ def search(task: Task) -> list[Tuned]:
 
 
 def _recorded(overrides: Sequence[str]) -> recording.Recording:
-    """The log of the scenario "steady" with these."""
+    """Return the log of the scenario "steady" with these."""
     loaded = scenario.load("steady", overrides)
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "bus.log"
@@ -83,7 +83,7 @@ def _recorded(overrides: Sequence[str]) -> recording.Recording:
 
 
 def text(logs: Sequence[Sequence[Tuned]]) -> str:
-    """The table as Markdown, from what was found in each log."""
+    """Return the table as Markdown, from what was found in each log."""
     rows, count = [], 0
     for name, (truth, scale, unit) in TRUTH.items():
         found = [entry for log in logs for entry in log if entry.name == name]
@@ -138,12 +138,12 @@ class CalibrationTask:
 
 
 def calibration_tasks(count: int) -> list[CalibrationTask]:
-    """Logs of both plants with seeds from 1 on."""
+    """Log of both plants with seeds from 1 on."""
     return [CalibrationTask(plant, seed) for plant in _PLANTS for seed in range(1, count + 1)]
 
 
 def calibrated(task: CalibrationTask) -> tuple[Calibrated, ...]:
-    """What `lever tune` finds in the log of `task`, starting at the defaults."""
+    """Return what `lever tune` finds in the log of `task`, starting at the defaults."""
     samples = _of_lever_sim(task) if task.plant == _PLANTS[0] else _of_independent_plant(task)
     return calibrate(Likelihood(samples), {}).entries
 
@@ -158,7 +158,7 @@ def _of_lever_sim(task: CalibrationTask) -> recording.Recording:
 
 
 def _of_independent_plant(task: CalibrationTask) -> recording.Recording:
-    """Samples straight from sil/lever_sil/envelope."""
+    """Return samples straight from sil/lever_sil/envelope."""
     truth, seeds = task.truth, [task.seed]
     motion = motions.Motion(duration=_DURATION, friction=truth["lever_friction"])
     given = motions.lanes(motion, seeds)
@@ -173,7 +173,7 @@ def _of_independent_plant(task: CalibrationTask) -> recording.Recording:
 
 
 def calibration_text(tasks: Sequence[CalibrationTask], logs: Sequence[tuple[Calibrated, ...]]) -> str:
-    """The table as Markdown, from what was found in the log of each task."""
+    """Return the table as Markdown, from what was found in the log of each task."""
     rows = []
     for name, row in UNKNOWNS.items():
         for of in _PLANTS:

@@ -66,7 +66,7 @@ def _measure(args: argparse.Namespace) -> int:
 
 
 def main() -> int:
-    """The command line."""
+    """Return the command line."""
     args = _parser().parse_args()
     try:
         return _measure(args)

@@ -37,7 +37,7 @@ class Result:
 
 
 def measure(program: Path, estimator: str, model: str, valgrind: str | None) -> Result:
-    """Runs the program over the recording of a model. Raises LeverError."""
+    """Run the program over the recording of a model. Raise LeverError."""
     recording = record(model)
     with tempfile.TemporaryDirectory(prefix="lever-benchmark-") as name:
         folder = Path(name)

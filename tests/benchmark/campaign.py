@@ -32,7 +32,7 @@ RUNS, CORES = (10**6, 10**9), (100, 1000)
 
 
 def nothing(plan: Plan, chunk: Chunk, folder: Path) -> tuple[int, float]:
-    """A chunk that is done at once."""
+    """Return a chunk that is done at once."""
     del plan, chunk, folder
     return 1, 0.0
 
@@ -49,7 +49,7 @@ def cost_of_a_run(flights: int) -> tuple[float, float]:
 
 
 def cost_of_a_chunk(count: int) -> tuple[float, float]:
-    """Time from one empty chunk to the next [s], and processor time of client and scheduler for it [s]."""
+    """Return time from one empty chunk to the next [s], and processor time of client and scheduler for it [s]."""
     quick = spec.load("quick")
     plan = Plan(dataclasses.replace(quick, seeds=1, chunk=1, design="random", points=count, vary=()))
     session.work = nothing
@@ -60,20 +60,20 @@ def cost_of_a_chunk(count: int) -> tuple[float, float]:
 
 
 def memory() -> int:
-    """Peak of this process [MB]."""
+    """Return peak of this process [MB]."""
     status = Path("/proc/self/status").read_text(encoding="ascii")
     return int(status.partition("VmHWM:")[2].split()[0]) // 1024  # ru_maxrss counts the process that started it, too
 
 
 def memory_of(call: Callable[..., None], *arguments: Any) -> int:
-    """Peak of a new process that does this [MB]."""
+    """Return peak of a new process that does this [MB]."""
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         pool.submit(call, *arguments).result()
         return pool.submit(memory).result()
 
 
 def make_chunk(flights: int, folder: Path) -> None:
-    """What a worker does, but for no more flights than these."""
+    """Do what a worker does, for no more flights than these."""
     plan = Plan(spec.load("tracking"))
     chunks.make(plan, Chunk(0, min(flights, plan.chunk(0).end)), folder)
 
@@ -104,7 +104,7 @@ def draw_rows(count: int, folder: Path) -> None:
 
 
 def sum_up(count: int, folder: Path) -> None:
-    """What `lever campaign` does when all rows are there."""
+    """Do what `lever campaign` does when all rows are there."""
     plan = of_rows(count)
     plan.done(folder)
     summary.build(plan, folder, session.Session())
@@ -114,7 +114,7 @@ def sum_up(count: int, folder: Path) -> None:
 
 
 def memories(rows: int, flights: int) -> Row:
-    """Of a campaign with so many rows [MB]."""
+    """Return the memories of a campaign with so many rows [MB]."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         worker = memory_of(make_chunk, flights, folder)
@@ -125,7 +125,7 @@ def memories(rows: int, flights: int) -> Row:
 
 
 def on_paper(runs: int, cores: int, run: float, row: float, chunk: float, price: float) -> Row:
-    """A campaign of minutes with one estimator, in chunks as they come by default."""
+    """Return a campaign of minutes with one estimator, in chunks as they come by default."""
     files = runs * run / chunks.WORK
     working, scheduling = runs * run / cores, files * chunk
     return {

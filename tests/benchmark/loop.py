@@ -21,7 +21,7 @@ _SECONDS, _ROUNDS = 60.0, 10
 
 
 def processor_time(wanted: Scenario, through_frames: bool) -> float:
-    """Of a run [s]."""
+    """Return the processor time of a run [s]."""
     rounds = []
     for _ in range(_ROUNDS):
         start = time.process_time()
@@ -31,7 +31,7 @@ def processor_time(wanted: Scenario, through_frames: bool) -> float:
 
 
 def main() -> int:
-    """Prints a row for each scenario."""
+    """Print a row for each scenario."""
     rows: list[Row] = []
     slow = []
     for name in SCENARIOS:

@@ -35,7 +35,7 @@ MINUTE_US = 60_000_000
 
 
 def simulated_minute(folder: Path) -> bulk.Frames:
-    """The frames that a simulation has sent to the estimator in a minute."""
+    """Return the frames that a simulation has sent to the estimator in a minute."""
     steady = scenario.load("steady", ["duration=60 s"])
     with LeverBus("lever", config=steady.config) as bus:
         simulate(steady, bus, folder)
@@ -44,7 +44,7 @@ def simulated_minute(folder: Path) -> bulk.Frames:
 
 
 def shifted(minute: bulk.Frames, number: int) -> bulk.Frames:
-    """The same samples `number` minutes later; 60 000 of them leave the counters as they are."""
+    """Return the same samples `number` minutes later; 60 000 of them leave the counters as they are."""
     frames = minute.copy()
     frames["time_us"] += START_US + number * MINUTE_US
     encode = codec.encoder("BASE_SAMPLE")

@@ -43,7 +43,7 @@ def main() -> int:
 
 
 def sources(build: Path) -> measuring.Sources:
-    """Those of the unit tests."""
+    """Return those of the unit tests."""
     unit, bulk = tools.ROOT / "tests/unit", tools.ROOT / "host_tools/lever_cdkf/firmware/c"
     ports = [path for path in (tools.FIRMWARE / "port").rglob("*.c") if path.name != "main.c"]
     linux = [path for path in ports if "stm32f4" not in path.parts and path.parent.name != "build"]

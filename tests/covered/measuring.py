@@ -62,7 +62,7 @@ class Coverage:
     missing: list[Missing] = field(default_factory=list)
 
     def share(self, kind: str) -> float:
-        """Of the kind reached, of what is not excluded [%]."""
+        """Return the share of the kind reached, of what is not excluded [%]."""
         excluded = sum(each.kind == kind and bool(each.number) for each in self.missing)
         missed = sum(each.kind == kind for each in self.open)
         return 100.0 * (1.0 - missed / (self.count[kind] - excluded))
@@ -86,7 +86,7 @@ class Sources:
 
 
 def measure(sources: Sources, folder: Path) -> Coverage:
-    """Builds every test in C, runs all, and reads what they have reached. Raises CoverageError."""
+    """Build every test in C, run all, and read what they have reached. Raise CoverageError."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     core = _each(sources.core, lambda source: _compiled(source, folder, [*sources.flags, "-fPIC", *COVERAGE]))
@@ -107,7 +107,7 @@ def measure(sources: Sources, folder: Path) -> Coverage:
 
 
 def _with_flights(sources: Sources, archive: Path, folder: Path) -> Path:
-    """The program whose bits are kept."""
+    """Return the program whose bits are kept."""
     flights = _each(FLIGHTS.glob("*.c"), lambda source: _compiled(source, folder, sources.flags))
     program = folder / "flights"
     _run([COMPILER, *COVERAGE[:1], *flights, archive, "-lm", "-o", program])
@@ -115,7 +115,7 @@ def _with_flights(sources: Sources, archive: Path, folder: Path) -> Path:
 
 
 def _with_oracle(sources: Sources, core: Sequence[Path], folder: Path) -> Path:
-    """The program that compares with the float64 oracle, in every case."""
+    """Return the program that compares with the float64 oracle, in every case."""
     program = folder / "oracle"
     source = _compiled(ROOT / "tests/mutation/oracle.c", folder, sources.flags)
     _run([COMPILER, *COVERAGE[:1], source, *core, "-lm", "-o", program])
@@ -190,7 +190,7 @@ class _Reader:
         self.found.missing.append(Missing(kind, self.path, line, what, own[0].number if own else ""))
 
     def _lines(self) -> None:
-        """A line is reached when any code on it is."""
+        """Count a line as reached when any code on it is."""
         reached = line_counts(self.file["segments"], len(self.text))
         self.found.count["lines"] += len(reached)
         for line, count in reached.items():
@@ -229,7 +229,7 @@ class _Reader:
 
 
 def line_counts(segments: Sequence[Sequence[Any]], lines: int) -> dict[int, int]:
-    """Executions of each line that has code: the greatest count of what begins on it or goes on over it."""
+    """Return how often each line with code is executed: the greatest count of what begins on it or goes on over it."""
     starting: dict[int, list[Sequence[Any]]] = {}
     for segment in segments:
         starting.setdefault(segment[0], []).append(segment)

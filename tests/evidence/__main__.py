@@ -65,7 +65,7 @@ def main() -> int:
 
 
 def gather(build: Path, scratch: Path) -> Content:
-    """All of it, the shortest part first. Raises EvidenceError, CoverageError or EvaError."""
+    """Return all of it, the shortest part first. Raise EvidenceError, CoverageError or EvaError."""
     if missing := [tool for tool in TOOLS if shutil.which(tool) is None]:
         packages = tools.ROOT / "tests/setup/debian-packages.txt"
         raise EvidenceError(f"no {', '.join(missing)} here: install the packages of {packages}")
@@ -92,8 +92,8 @@ def gather(build: Path, scratch: Path) -> Content:
 
 
 def _run(command: Sequence[str | Path]) -> int:
-    """A part that is a program; what it says is progress. Returns its status, which may be 1, "something is missed".
-    Raises EvidenceError for another."""
+    """Return a part that is a program; what it says is progress. Returns its status, which may be 1, "something is
+    missed". Raises EvidenceError for another."""
     status = subprocess.run([str(word) for word in command], cwd=tools.ROOT, check=False).returncode
     if status not in (0, 1):
         raise EvidenceError(f"{Path(command[0]).name} {Path(command[1]).name} ended with status {status}")
@@ -117,14 +117,14 @@ def _eva() -> Content:
 
 
 def _faults(build: Path, file: Path) -> Content:
-    """The matrix as `lever faults` has it."""
+    """Return the matrix as `lever faults` has it."""
     _run([build / "venv/bin/lever", "faults", "--json", file])
     content = _read(file)
     return {name: content[name] for name in ("count", "missed", "unexpected", "silent", "rows")}
 
 
 def _soak(build: Path, file: Path) -> Content:
-    """A day without a reset, as `lever soak` has it."""
+    """Return a day without a reset, as `lever soak` has it."""
     _run([build / "venv/bin/lever", "soak", "--out", file.with_suffix(".html"), "--json", file])
     content = _read(file)
     return {name: content[name] for name in ("total", "memory_growth_mib", "troubles")} | {
@@ -133,7 +133,7 @@ def _soak(build: Path, file: Path) -> Content:
 
 
 def _fuzz(build: Path) -> Content:
-    """Each fuzz target for a while, from a seed of now."""
+    """Return each fuzz target for a while, from a seed of now."""
     file = build / "fuzz.json"
     command: list[str | Path] = [
         *(sys.executable, tools.ROOT / "tests/fuzz", "--seconds", str(FUZZED)),
@@ -152,7 +152,7 @@ def _coverage(build: Path) -> Content:
 
 
 def _requirements(build: Path, report: Path) -> Content:
-    """Each with its tests and what they said."""
+    """Return each with its tests and what they said."""
     required = tracing.requirements()
     said = results.of_c(build) | results.of_python(report)
     traced = tracing.traces()

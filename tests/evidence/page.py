@@ -24,7 +24,7 @@ _STYLE = """
 
 
 def build(content: Mapping[str, Any]) -> str:
-    """The whole page."""
+    """Return the whole page."""
     page = Page(
         "Evidence", "What the firmware promises, and what proves it.", "cmake --workflow --preset evidence-page"
     )
@@ -69,12 +69,12 @@ def _requirements(content: Mapping[str, Any]) -> str:
 
 
 def _with_code(text: str) -> str:
-    """What stands between backticks is code."""
+    """Return what stands between backticks is code."""
     return re.sub("`(.+?)`", r"<code>\1</code>", html.escape(text))
 
 
 def _test(test: Mapping[str, Any]) -> str:
-    """Its name, result and figures."""
+    """Return its name, result and figures."""
     said = test["verdict"] if test["cases"] < 2 else f"{test['verdict']}, {test['cases']} cases"
     lines = [f"{html.escape(name)}: {html.escape(_range(of))}" for name, of in test["figures"].items()]
     figures = "<br>".join(["", *lines])
@@ -86,7 +86,7 @@ def _test(test: Mapping[str, Any]) -> str:
 
 
 def _range(values: Sequence[str]) -> str:
-    """Of the cases of a test: one value, or the least and the greatest."""
+    """Return the range of the cases of a test: one value, or the least and the greatest."""
     try:
         ordered = sorted(values, key=float)
     except ValueError:
@@ -125,7 +125,7 @@ def _mutants(content: Mapping[str, Any]) -> str:
 
 
 def _listed(title: str, items: Sequence[str]) -> str:
-    """A list to be opened; nothing when it is empty."""
+    """Return a list to be opened; nothing when it is empty."""
     listed = "".join(f"<li>{html.escape(each)}</li>" for each in items)
     return f"<details><summary>{title}: {len(items)}</summary><ul>{listed}</ul></details>" if items else ""
 

@@ -38,7 +38,7 @@ ByTest = dict[tuple[str, str], Said]
 
 
 def of_python(report: Path) -> ByTest:
-    """Runs the marked tests of Python, which leave `report`. Raises EvidenceError."""
+    """Run the marked tests of Python, which leave `report`. Raises EvidenceError."""
     files = sorted({trace.path for trace in tracing.traces() if trace.path.endswith(".py")})
     command = [sys.executable, "-m", "pytest", "-q", "--tb=short", "-m", "requirement", f"--junitxml={report}", *files]
     status = subprocess.run(command, cwd=tools.ROOT, check=False).returncode
@@ -61,7 +61,7 @@ def read(report: str) -> ByTest:
 
 
 def of_c(build: Path) -> ByTest:
-    """Runs the programs of the marked tests in C, each line of which says `file:line:test:PASS` or FAIL. Raises
+    """Run the programs of the marked tests in C, each line of which says `file:line:test:PASS` or FAIL. Raises
     EvidenceError."""
     said: ByTest = {}
     for path in sorted({trace.path for trace in tracing.traces() if trace.path.endswith(".c")}):

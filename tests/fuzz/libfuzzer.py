@@ -53,14 +53,14 @@ class Result:
     text: str
 
     def count(self, name: str) -> int:
-        """What it says of `stat::name`; 0 where it says nothing."""
+        """Return what it says of `stat::name`; 0 where it says nothing."""
         said = re.search(rf"stat::{name}: +(\d+)", self.text)
         return int(said[1]) if said else 0
 
 
 def build(name: str, folder: Path, replaced: Sequence[tuple[str, Path]] = ()) -> Path:
-    """The fuzzer of a target, in `folder`; `replaced`: sources in whose place others are taken, beside the objects
-    that are there from the build before. Raises FuzzError."""
+    """Return the fuzzer of a target, in `folder`; `replaced`: sources in whose place others are taken, beside the
+    objects that are there from the build before. Raise FuzzError."""
     objects = folder / f"{name}.objects"
     objects.mkdir(parents=True, exist_ok=True)
     compiler = next((path for each in COMPILERS.split("|") if (path := shutil.which(each))), None)
@@ -89,7 +89,7 @@ def _run(command: Sequence[str]) -> None:
 
 
 def seeds(name: str) -> list[bytes]:
-    """The inputs that a target begins with."""
+    """Return the inputs that a target begins with."""
     file = FOLDER / f"{name}.seeds"
     blocks = re.split(r"^=== .*\n", file.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:] if file.exists() else []
     return [bytes.fromhex(block) if name in HEXADECIMAL else block.encode() for block in blocks]

@@ -143,7 +143,7 @@ time [s];theta [deg];z_ddot
 
 
 def mf4() -> bytes:
-    """A file of two signals, as asammdf writes it."""
+    """Return a file of two signals, as asammdf writes it."""
     time = np.arange(20) * 1e-3
     signals = [Signal(np.sin(time * k), time, name=f"signal {k}", unit="rad") for k in (1, 2)]
     with TemporaryDirectory() as folder, MDF(version="4.10") as file:
@@ -189,7 +189,7 @@ READERS: dict[str, tuple[str, bytes, Callable[[str], object]]] = {
 
 
 def changed(good: bytes, places: list[tuple[float, int, bytes]]) -> bytes:
-    """Replaces at each place (as a share of the text) so many bytes by others."""
+    """Replace at each place (as a share of the text) so many bytes by others."""
     text = good
     for share, length, token in places:
         at = int(share * len(text))

@@ -20,7 +20,7 @@ _EVERYWHERE, _POSIX = MISRA.split("## On a POSIX host")
 
 
 def _rules(text: str) -> set[str]:
-    """Those in the first column of tables."""
+    """Return those in the first column of tables."""
     lists = re.findall(r"^\| (\d+\.\d+(?:, \d+\.\d+)*) \|", text, re.MULTILINE)
     return {f"misra-c2012-{rule}" for each in lists for rule in each.split(", ")}
 
@@ -35,7 +35,7 @@ CPPCHECK_FINDING = re.compile(
 
 
 def _run(tool: str, *arguments: str | Path) -> tuple[bool, str]:
-    """Whether a tool of the virtual environment exits with 0, and what it says."""
+    """Return whether a tool of the virtual environment exits with 0, and what it says."""
     command = [str(Path(sys.executable).with_name(tool)), *map(str, arguments)]
     result = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
     return result.returncode == 0, result.stdout
@@ -51,13 +51,14 @@ def layout(*files: str | Path) -> str:
 
 
 def tidy(database: str | Path, file: str | Path, *options: str) -> str:
-    """A C file of a compilation database is clean under .clang-tidy."""
+    """Check that a C file of a compilation database is clean under .clang-tidy."""
     configuration = f"--config-file={ROOT}/.clang-tidy"
     return _said(*_run("clang-tidy", "--quiet", configuration, "-p", database, *options, file))
 
 
 def tidy_cross(database: str | Path, file: str | Path) -> str:
-    """The same of a file for the microcontroller: clang speaks for its processor, and reads the C library of gcc."""
+    """Return the same of a file for the microcontroller: clang speaks for its processor, and reads the C library of
+    gcc."""
     gcc = ["arm-none-eabi-gcc", "-print-sysroot"]
     sysroot = subprocess.run(gcc, capture_output=True, text=True, check=True).stdout.strip()
     headers = (f"{sysroot}/include/newlib", f"{sysroot}/include", "/usr/include/newlib")
@@ -82,12 +83,13 @@ def misra(*files: str | Path, without: AbstractSet[str] = frozenset()) -> str:
 
 
 def misra_image(build_headers: str, *files: str | Path) -> str:
-    """The same of all the files of an image for the microcontroller beside the core, as they are compiled for it."""
+    """Return the same of all the files of an image for the microcontroller beside the core, as they are compiled for
+    it."""
     return misra("-D__arm__", f"-I{build_headers}", *files)
 
 
 def misra_posix(*files: str | Path) -> str:
-    """The same of the port to POSIX, but for what the page names for it."""
+    """Return the same of the port to POSIX, but for what the page names for it."""
     return misra("--library=posix", *files, without=NOT_ON_POSIX)
 
 
@@ -105,21 +107,22 @@ def analyzer(build_headers: str, *files: str | Path) -> str:
 
 
 def python() -> str:
-    """The Python files are laid out by ruff, and clean under its checks."""
+    """Check that the Python files are laid out by ruff, and clean under its checks."""
     return _said(*_run("ruff", "format", "--check", "--diff", *PYTHON_FOLDERS)) + _said(
         *_run("ruff", "check", *PYTHON_FOLDERS)
     )
 
 
 def types(build_dir: str | Path) -> str:
-    """The Python files are fully typed."""
+    """Check that the Python files are fully typed."""
     if sys.version_info < (3, 11):
         return "the numpy for Python 3.10 declares other types\n" if os.environ.get("LEVER_REQUIRE_ALL") == "1" else ""
     return _said(*_run("mypy", f"--cache-dir={build_dir}/mypy"))
 
 
 def suppressed(texts: Iterable[str]) -> tuple[dict[str, str], int]:
-    """Number and rule of the MISRA deviations that C texts suppress, and how many suppressions have no number."""
+    """Return number and rule of the MISRA deviations that C texts suppress, and how many suppressions have no
+    number."""
     numbered = re.compile(r"cppcheck-suppress\s+misra-c2012-(?P<rule>\d+\.\d+)\s*;\s*(?P<number>D\d+)\s*\*/")
     found: dict[str, str] = {}
     without = 0

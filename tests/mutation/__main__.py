@@ -28,7 +28,7 @@ GOLDEN = Path(__file__).resolve().parents[1] / "quality/embedded/golden.txt"
 
 
 def unit_tests(build: Path) -> Iterator[Test]:
-    """Each test of the C programs."""
+    """Yield each test of the C programs."""
     for name in (build / "programs.txt").read_text().split():
         program = build / "programs" / name
         listed = subprocess.run([program, "--list"], stdout=subprocess.PIPE, text=True, check=True).stdout
@@ -41,8 +41,8 @@ def oracle_cases(build: Path) -> Iterator[Test]:
 
 
 def flights(build: Path, program: Path) -> Iterator[Test]:
-    """Those whose bits are kept, each compared with all lines that it prints, so that it ends at the first difference.
-    Raises RuntimeError when they are not the accepted ones."""
+    """Yield those whose bits are kept, each compared with all lines that it prints, so that it ends at the first
+    difference. Raise RuntimeError when they are not the accepted ones."""
     lines: dict[str, list[str]] = defaultdict(list)
     flown = subprocess.run([program], stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines(keepends=True)
     if [line for line in flown if len(line.split()) == 2] != GOLDEN.read_text().splitlines(keepends=True):

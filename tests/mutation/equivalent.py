@@ -16,7 +16,7 @@ FILE = Path(__file__).with_name("equivalent.txt")
 
 
 def named(mutants: Iterable[Mutant]) -> dict[str, Mutant]:
-    """All mutants of the core by name."""
+    """Return all mutants of the core by name."""
     seen: Counter[str] = Counter()
     names = {}
     for each in mutants:
@@ -27,7 +27,7 @@ def named(mutants: Iterable[Mutant]) -> dict[str, Mutant]:
 
 
 def equivalents(mutants: Iterable[Mutant]) -> dict[int, str]:
-    """The reason by number. Raises LookupError for a name that no mutant has, or one that stands there twice."""
+    """Return the reason by number. Raise LookupError for a name that no mutant has, or one that stands there twice."""
     names, reasons, reason = named(mutants), {}, ""
     for line in FILE.read_text(encoding="utf-8").splitlines():
         if line.startswith("#"):

@@ -58,14 +58,14 @@ class TestFile:
     tests: tuple[Test, ...]
 
     def able(self, mutant: PythonMutant) -> list[Test]:
-        """The tests that may notice it: those that call its function first, then the shortest."""
+        """Return the tests that may notice it: those that call its function first, then the shortest."""
         own = [test for test in self.tests if concerns(test.reached, mutant)]
         others = [test for test in self.tests if test not in own] if concerns(self.reached, mutant) else []
         return sorted(own, key=lambda test: test.seconds) + sorted(others, key=lambda test: test.seconds)
 
 
 def concerns(reached: frozenset[str], mutant: PythonMutant) -> bool:
-    """Its function is reached; of a mutant outside of functions: any of its module."""
+    """Return whether its function is reached; of a mutant outside of functions: any of its module."""
     if mutant.function:
         return f"{mutant.path}:{mutant.function}" in reached
     return any(place.startswith(f"{mutant.path}:") and not place.endswith(IMPORTED) for place in reached)
@@ -76,7 +76,7 @@ def files_under(folders: Sequence[str], name: str) -> list[Path]:
 
 
 def failure(arguments: Sequence[str], environment: dict[str, str], timeout: float | None = None) -> str:
-    """What pytest says about the first test that fails; nothing: all pass."""
+    """Return what pytest says about the first test that fails; nothing: all pass."""
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+", encoding="utf-8") as output:
         options = ["-q", "--tb=line", "-p", "no:cacheprovider", "-p", "selection", f"--basetemp={folder}/t"]
         path = os.pathsep.join([str(HOOK), *filter(None, [os.environ.get("PYTHONPATH")])])
@@ -98,7 +98,7 @@ def failure(arguments: Sequence[str], environment: dict[str, str], timeout: floa
 
 
 def measured(path: Path, kept: Path) -> None:
-    """Runs a test file without a mutant, and keeps what its tests call."""
+    """Run a test file without a mutant, and keep what its tests call."""
     with tempfile.TemporaryDirectory() as folder:
         under = os.pathsep.join(str(ROOT / each) for each in MUTATED)
         fault = failure([str(path)], {"REACHED": folder, "REACHED_UNDER": under})
@@ -132,7 +132,7 @@ def test_file(path: str, reached: list[str], tests: list[tuple[str, float, list[
 
 
 def killer_of(mutant: PythonMutant, files: Sequence[TestFile]) -> str:
-    """What the test says that fails with the mutant; nothing: it survives."""
+    """Return what the test says that fails with the mutant; nothing: it survives."""
     able = [(file, tests) for file in files if (tests := file.able(mutant))]
     if not able:  # a module without functions
         able = [(file, list(file.tests)) for file in files if f"{mutant.path}:{IMPORTED}" in file.reached]

@@ -98,7 +98,7 @@ class Judge:
         return answer
 
     def measured(self, tests: Sequence[Test]) -> list[Case]:
-        """Runs each without a mutant. Raises RuntimeError when one fails."""
+        """Run each without a mutant. Raise RuntimeError when one fails."""
         return list(self.pool.map(self._measure, tests))
 
     def _measure(self, test: Test) -> Case:
@@ -112,7 +112,7 @@ class Judge:
         return self.pool.map(lambda mutant: self._verdict(mutant, cases), mutants)
 
     def _verdict(self, mutant: Mutant, cases: Sequence[Case]) -> Verdict:
-        """Those cases come first that promise most for their time."""
+        """Return those cases come first that promise most for their time."""
         function = f"{mutant.path}:{mutant.function}"
         able = [case for case in cases if mutant.guard in case.reached]
         for case in sorted(able, key=lambda case: case.seconds / self._promise(function, case.test.name)):
@@ -125,6 +125,6 @@ class Judge:
         return Verdict(mutant, "", bool(able))
 
     def _promise(self, function: str, test: str) -> float:
-        """How probably it kills: what it has killed of the same function counts, and of all."""
+        """Return how probably it kills: what it has killed of the same function counts, and of all."""
         overall = (self.killed["", test] + 0.5) / (self.tried["", test] + 1)
         return (self.killed[function, test] + overall) / (self.tried[function, test] + 1)

@@ -24,7 +24,7 @@ WITHIN = {"theta": reference.THETA_WITHIN, "theta_dot": reference.THETA_DOT_WITH
 
 
 def limits(case: reference.Case, expected: reference.Expected) -> Iterator[tuple[reference.Array, reference.Array]]:
-    """Value and tolerance of each quantity, in the order of oracle.c."""
+    """Yield value and tolerance of each quantity, in the order of oracle.c."""
     values = expected.values
     for name in (*reference.STATES, *PARAMETERS[case.model], *reference.DERIVED):
         sigma = values[f"{name}_sigma"]

@@ -52,7 +52,7 @@ class PythonMutant:
 
 
 def _operators(node: ast.AST) -> Iterator[ast.AST]:
-    """What takes the place of an expression."""
+    """Yield what takes the place of an expression."""
     if isinstance(node, ast.Compare):
         for k, operator in enumerate(node.ops):
             for other in COMPARISONS[type(operator)]:
@@ -85,7 +85,7 @@ def _constants(value: object) -> Iterator[str | float]:
 
 
 def _statements(node: ast.AST) -> Iterator[ast.AST]:
-    """What takes the place of a statement."""
+    """Yield what takes the place of a statement."""
     if isinstance(node, ast.Return) and node.value is not None and not _is_none(node.value):
         yield ast.Return(None)
     is_call = isinstance(node, ast.Expr) and not isinstance(node.value, ast.Constant)
@@ -109,7 +109,7 @@ def _is_none(node: ast.AST) -> bool:
 
 
 def replacements(node: ast.AST, field: str) -> Iterator[ast.AST]:
-    """What takes the place of a node that is this field of its parent."""
+    """Yield what takes the place of a node that is this field of its parent."""
     yield from _operators(node)
     yield from _statements(node)
     if isinstance(node, ast.Constant):
@@ -132,7 +132,7 @@ Place = tuple[ast.AST, str, int | None]
 
 
 def _places(parent: ast.AST, function: str = "") -> Iterator[tuple[ast.AST, Place, str]]:
-    """Each node that may change, where it hangs, and the function around it."""
+    """Yield each node that may change, where it hangs, and the function around it."""
     if isinstance(parent, (ast.FunctionDef, ast.AsyncFunctionDef)) and not function:
         function = f"{parent.name}()"
     for field, value in ast.iter_fields(parent):
@@ -153,7 +153,7 @@ def _put(place: Place, node: ast.AST) -> None:
 
 
 def _changes(tree: ast.Module) -> Iterator[tuple[ast.AST, ast.AST, Place, str]]:
-    """Of a module: node, what takes its place, where that is, and the function."""
+    """Yield the changes of a module: node, what takes its place, where that is, and the function."""
     for node, place, function in list(_places(tree)):
         for new in replacements(node, place[1]):
             yield node, ast.fix_missing_locations(ast.copy_location(new, node)), place, function
@@ -164,7 +164,7 @@ def _short(text: str) -> str:
 
 
 def mutants_of(root: Path, path: Path) -> Iterator[PythonMutant]:
-    """All mutants of a module, a path relative to the root."""
+    """Yield all mutants of a module, a path relative to the root."""
     changes = _changes(ast.parse((root / path).read_text(encoding="utf-8")))
     seen: Counter[str] = Counter()
     for number, (node, new, _, function) in enumerate(changes):
@@ -176,7 +176,7 @@ def mutants_of(root: Path, path: Path) -> Iterator[PythonMutant]:
 
 
 def text_with(root: Path, mutant: PythonMutant) -> str:
-    """The module with the mutant in it."""
+    """Return the module with the mutant in it."""
     tree = ast.parse((root / mutant.path).read_text(encoding="utf-8"))
     _, new, place, _ = next(itertools.islice(_changes(tree), mutant.number, None))
     _put(place, new)
@@ -184,7 +184,7 @@ def text_with(root: Path, mutant: PythonMutant) -> str:
 
 
 def lines_of(root: Path, paths: Iterable[Path]) -> dict[tuple[Path, int], list[PythonMutant]]:
-    """The mutants of each line of logic."""
+    """Return the mutants of each line of logic."""
     lines: dict[tuple[Path, int], list[PythonMutant]] = defaultdict(list)
     for path in paths:
         for mutant in mutants_of(root, path):

@@ -62,7 +62,7 @@ class Schemata:
         """Sites in constant expressions."""
 
     def switched_file(self, path: str, source: bytes) -> str:
-        """The text of a file with its mutants."""
+        """Return the text of a file with its mutants."""
         return '#include "mutant.h"\n' + _File(self, path, source).text_with_mutants()
 
 
@@ -82,7 +82,7 @@ class _File:
         return self.source[node.start_byte : node.end_byte].decode()
 
     def rebuilt(self, node: Node, parts: list[str]) -> str:
-        """The text of a node with other texts for its children."""
+        """Return the text of a node with other texts for its children."""
         text, at = "", node.start_byte
         for child, part in zip(node.children, parts, strict=True):
             text += self.source[at : child.start_byte].decode() + part
@@ -90,7 +90,7 @@ class _File:
         return text + self.source[at : node.end_byte].decode()
 
     def add(self, node: Node, after: str) -> int:
-        """A new mutant, which replaces the node; its number."""
+        """Return a new mutant, which replaces the node; its number."""
         number = len(self.schemata.mutants) + 1
         before, after = (" ".join(text.split()) for text in (self.text(node), after))
         line = node.start_point.row + 1
@@ -98,7 +98,7 @@ class _File:
         return number
 
     def leave_out(self, node: Node) -> str:
-        """Counts the sites in a constant expression."""
+        """Count the sites in a constant expression."""
         known = len(self.schemata.mutants)
         self.expression(node)
         self.schemata.left_out += len(self.schemata.mutants) - known
@@ -106,7 +106,7 @@ class _File:
         return self.text(node)
 
     def statement(self, node: Node) -> str:
-        """The text of whatever is not inside an expression."""
+        """Return the text of whatever is not inside an expression."""
         if node.type == "function_definition":
             if node.has_error:
                 raise ValueError(f"{self.path}:{node.start_point.row + 1}: tree-sitter-c cannot read this function")
@@ -130,14 +130,14 @@ class _File:
         return self.text(node) if node else ""
 
     def guarded(self, node: Node) -> str:
-        """An expression, switched where it has mutants."""
+        """Return an expression, switched where it has mutants."""
         first = self.guard = len(self.schemata.mutants) + 1
         switched = self.expression(node)
         last = len(self.schemata.mutants)
         return f"(mutant_in({first}u, {last}u) ? ({switched}) : ({self.text(node)}))" if last >= first else switched
 
     def droppable(self, node: Node) -> str:
-        """A statement that a mutant leaves out."""
+        """Return a statement that a mutant leaves out."""
         first = self.guard = len(self.schemata.mutants) + 1
         effects = ("assignment_expression", "update_expression", "call_expression")
         if not any(each.type in effects for each in _all(node)):
@@ -148,7 +148,7 @@ class _File:
         return f"if ({some}) {{ if (mutant != {first}u) {{ {switched} }} }} else {{ {self.text(node)} }}"
 
     def expression(self, node: Node) -> str:
-        """The text of an expression in which the mutants are switched."""
+        """Return the text of an expression in which the mutants are switched."""
         if node.type in CONSTANT_PLACES and node.type != "array_declarator":
             return self.text(node)
         replacements = [(self.add(node, after), after) for after in self.replacements(node)]
@@ -158,7 +158,7 @@ class _File:
         return text
 
     def replacements(self, node: Node) -> Iterator[str]:
-        """What mutants put in the place of an expression."""
+        """Yield what mutants put in the place of an expression."""
         operator = node.child_by_field_name("operator")
         if node.type in ("binary_expression", "assignment_expression", "update_expression"):
             for other in OPERATORS.get(self.text(operator) if operator else "", []):
@@ -187,7 +187,7 @@ def _is_expression(node: Node) -> bool:
 
 
 def _is_condition(node: Node) -> bool:
-    """It alone, apart from parentheses, decides which way to go."""
+    """Return whether the node alone, apart from parentheses, decides which way to go."""
     outer = node
     while outer.parent and outer.parent.type == "parenthesized_expression":
         outer = outer.parent
@@ -206,7 +206,7 @@ def _all(node: Node) -> Iterator[Node]:
 
 
 def numbers_of(sources: Iterable[bytes]) -> dict[str, str]:
-    """The macros in these files that stand for a number, with it."""
+    """Return the macros in these files that stand for a number, with it."""
     define = re.compile(r"^#define (\w+) +([^ \n]+) *(?:/\*.*)?$", re.MULTILINE)
     found = (match for source in sources for match in define.finditer(source.decode()))
     return {match[1]: match[2] for match in found if NUMBER.fullmatch(match[2])}

@@ -109,7 +109,7 @@ class Belief(ABC):
 
     @abstractmethod
     def start_state(self, x: Array, factor: Array) -> None:
-        """The state starts anew, independent of the parameters; pending information is dropped."""
+        """Start the state anew, independent of the parameters; pending information is dropped."""
 
     @abstractmethod
     def predict(self, motion: Motion, noise: Array, push: Array = UNMOVED, force: Force | None = None) -> None:
@@ -130,20 +130,20 @@ class Belief(ABC):
 
     @abstractmethod
     def drop_pending(self) -> None:
-        """It is not to be learnt."""
+        """Drop the pending information: it is not to be learnt."""
 
     @abstractmethod
     def learn(self, trust: float = 1.0) -> Array:
-        """The parameters learn what is pending, which counts by `trust`; returns the change of w (3,)."""
+        """Return the parameters learn what is pending, which counts by `trust`; returns the change of w (3,)."""
 
     @abstractmethod
     def restore(self, w: Array, w_factor: Array, errors: bool) -> None:
-        """The parameters become these, independent of the state, whose covariance stays; what considered errors make
+        """Set the parameters to these, independent of the state, whose covariance stays; what considered errors make
         of w stays or is 0. Pending information is dropped."""
 
     @abstractmethod
     def forget(self, growth: float) -> None:
-        """The covariance of the parameters grows by the factor 1 + growth."""
+        """Let the covariance of the parameters grow by the factor 1 + growth."""
 
     @abstractmethod
     def walk(self, variance: Array) -> None:
@@ -156,7 +156,7 @@ class Belief(ABC):
 
     @abstractmethod
     def bound(self, least: Array, greatest: Array) -> None:
-        """Keeps the parameters where they may be."""
+        """Keep the parameters where they may be."""
 
 
 class StepScore:
@@ -240,8 +240,8 @@ class TwoStage(Belief):
         self.x_factor = cdkf.tria(columns)
 
     def _take(self, force: Force, expected: float, columns: Array, v: Array, errors: Array, response: float) -> Array:
-        """The belief given a force, of which its last row of `columns`, v, errors and response are. Returns the columns
-        of the state."""
+        """Return the belief given a force, of which its last row of `columns`, v, errors and response are. Returns
+        the columns of the state."""
         state, seen = columns[:-1], columns[-1]
         innovation, variance = force.value - expected, float(seen @ seen) + force.noise**2
         by_parameters = v @ self._w_factor
@@ -418,7 +418,7 @@ class Augmented(Belief):
         """Nothing is."""
 
     def learn(self, trust: float = 1.0) -> Array:
-        """Everything is learnt sample by sample, and in full, whatever `trust` is."""
+        """Learn sample by sample, and in full, whatever `trust` is."""
         correction, self.correction = self.correction, np.zeros(self.parameters)
         return correction
 

@@ -35,7 +35,7 @@ class Measurement:
 
 
 def tria(matrix: Array) -> Array:
-    """The lower-triangular S with S Sᵀ = A Aᵀ and diagonal >= 0, of an A of shape (n, k >= n)."""
+    """Return the lower-triangular S with S Sᵀ = A Aᵀ and diagonal >= 0, of an A of shape (n, k >= n)."""
     upper: Array = np.asarray(np.linalg.qr(matrix.T, mode="r"))
     # QR leaves the sign of each row of R open. The whole row turns with its diagonal, or S Sᵀ would change.
     lower: Array = upper.T * np.where(upper.diagonal() < 0.0, -1.0, 1.0)
@@ -43,7 +43,7 @@ def tria(matrix: Array) -> Array:
 
 
 def draw(mean: Array, factor: Array) -> Array:
-    """The sigma points of a belief, shape (n, 2n + 1)."""
+    """Return the sigma points of a belief, shape (n, 2n + 1)."""
     centre = mean[:, np.newaxis]
     offset = H * factor
     return np.concatenate((centre, centre + offset, centre - offset), axis=1)
@@ -62,13 +62,13 @@ def differences(values: Array) -> tuple[Array, Array, Array]:
 
 
 def predict(mean: Array, factor: Array, step: Function, noise: Array) -> tuple[Array, Array]:
-    """The belief after `step`, to which noise with the factor `noise` (n, n) is added."""
+    """Return the belief after `step`, to which noise with the factor `noise` (n, n) is added."""
     predicted, first, second = differences(step(draw(mean, factor)))
     return predicted, tria(np.concatenate((first, second, noise), axis=1))
 
 
 def measure(mean: Array, factor: Array, output: Function, noise: Array) -> Measurement:
-    """What the belief predicts for `output`, to which noise with the factor `noise` (m, m) is added."""
+    """Return what the belief predicts for `output`, to which noise with the factor `noise` (m, m) is added."""
     expected, first, second = differences(output(draw(mean, factor)))
     return Measurement(expected, first, second, noise, tria(np.concatenate((first, second, noise), axis=1)))
 
@@ -81,7 +81,7 @@ def gain(factor: Array, measurement: Measurement) -> Array:
 
 
 def update(mean: Array, factor: Array, measurement: Measurement, k: Array, innovation: Array) -> tuple[Array, Array]:
-    """The belief after seeing the output, in the square-root Joseph form.
+    """Return the belief after seeing the output, in the square-root Joseph form.
 
     S⁺ S⁺ᵀ = (S - K C)(S - K C)ᵀ + K D Dᵀ Kᵀ + K N Nᵀ Kᵀ is a sum of squares whatever K is, so it cannot lose its
     factor; the usual downdate S Sᵀ - K S_y S_yᵀ Kᵀ can.
@@ -91,12 +91,12 @@ def update(mean: Array, factor: Array, measurement: Measurement, k: Array, innov
 
 
 def normalised_square(factor: Array, innovation: Array) -> float:
-    """Normalised innovation squared νᵀ (S_y S_yᵀ)⁻¹ ν: chi-square with m degrees of freedom if consistent."""
+    """Return normalised innovation squared νᵀ (S_y S_yᵀ)⁻¹ ν: chi-square with m degrees of freedom if consistent."""
     whitened = np.linalg.solve(factor, innovation)
     return float(whitened @ whitened)
 
 
 def deviations(factor: Array) -> Array:
-    """Standard deviation of each element of a belief: the lengths of the factor's rows."""
+    """Return standard deviation of each element of a belief: the lengths of the factor's rows."""
     lengths: Array = np.sqrt(np.einsum("ij,ij->i", factor, factor))
     return lengths

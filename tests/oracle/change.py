@@ -19,7 +19,8 @@ class ChangeDetection:
         self.variance: Array = np.zeros(3)
 
     def step(self, correction: Array, variance: Array, period: float) -> bool:
-        """A correction and the variance expected of it, `period` [s] after the last; returns whether w has changed."""
+        """Return a correction and the variance expected of it, `period` [s] after the last; returns whether w has
+        changed."""
         share = min(period / self.memory, 1.0)
         self.sum = (1.0 - share) * self.sum + correction
         self.variance = (1.0 - share) ** 2 * self.variance + np.maximum(variance, 0.0)

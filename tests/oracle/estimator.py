@@ -44,7 +44,7 @@ Model = Lever | LinearPhysical | LinearBlackBox | Hand
 
 
 def model_of(settings: Mapping[str, float], name: str, preload: str) -> Model:
-    """The model of that name in firmware/lever_settings.def."""
+    """Return the model of that name in firmware/lever_settings.def."""
     if name == "lever":
         return Lever.from_settings(settings, preload)
     if name == "hand":
@@ -133,8 +133,8 @@ class Estimator:
         base_valid: bool = True,
         force: float | None = None,
     ) -> None:
-        """Takes the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m) and
-        the grip force [N] as the sensors show them."""
+        """Take the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m)
+        and the grip force [N] as the sensors show them."""
         duration = time - self.time
         self.unsettled -= counted(duration)
         substeps = min(max(1, round(duration / self.settings["sample_period"])), MOST_SUBSTEPS)
@@ -190,7 +190,7 @@ class Estimator:
         return bool(self.excitation_square >= least and self.motion_square >= 0.25 * least)
 
     def _are_spikes(self, y: Array, valid: NDArray[np.bool_], duration: float) -> NDArray[np.bool_]:
-        """Outputs far from what is expected, until they have been for SPIKE_TIME. After an outage nothing is."""
+        """Return outputs far from what is expected, until they have been for SPIKE_TIME. After an outage nothing is."""
         noise = self.learning.noise.output_noise
         state = cdkf.deviations(self.belief.joint_factor)[len(self.scale.names) :]
         least = UNSETTLED if self.unsettled > 0.0 else 1.0
@@ -239,7 +239,7 @@ class Estimator:
         self.last_input = u
 
     def _force(self, measured: float | None, u: tuple[float, float], errors: Array, dt: float) -> Force | None:
-        """The grip force as the belief takes it. What moves the lever besides acts on it, not on the hand."""
+        """Return the grip force as the belief takes it. What moves the lever besides acts on it, not on the hand."""
         grip = self.grip
         seen = None if grip is None else grip.step(measured, self.belief.x, u, errors[:2], self.trim, dt)
         if grip is None or seen is None:
@@ -256,7 +256,8 @@ class Estimator:
         return deviation if self.detrended else value
 
     def _subtract_trim(self, y: Array, valid: NDArray[np.bool_], dt: float) -> tuple[Array, bool]:
-        """The outputs without their slow level, as x is in preload trim, and whether one is back after an outage.
+        """Return the outputs without their slow level, as x is in preload trim, and whether one is back after an
+        outage.
 
         A level waits for samples, and after a few missing ones takes a straight line when the output is back.
         """
@@ -301,7 +302,8 @@ class Estimator:
         self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
 
     def _predict(self, u: tuple[float, ...], errors: Array, dt: float, force: Force | None) -> None:
-        """The trim is where it was at the last sample. `errors` (3, 4): of the inputs, per unit of each considered."""
+        """Predict with the trim of the last sample. `errors` (3, 4): of the inputs, per unit of each considered
+        error."""
         trim = self.outputs[0].level
         angle = np.array(((trim if self.detrended else 0.0,), (0.0,)))
 
@@ -324,7 +326,8 @@ class Estimator:
         self.belief.predict(motion, self._process_noise(dt), push, force)
 
     def _process_noise(self, dt: float) -> Array:
-        """Factor (2, 3) of an integrated random walk of θ̇ (its covariance: van Loan 1978) plus a random walk of θ."""
+        """Return factor (2, 3) of an integrated random walk of θ̇ (its covariance: van Loan 1978) plus a random walk
+        of θ."""
         own = self.settings["theta_process_noise"]
         rate = self.learning.noise.process_noise + self.learning.disturbance
         return math.sqrt(dt) * np.array([[own, rate * dt / 2.0, rate * dt / math.sqrt(12.0)], [0.0, rate, 0.0]])
@@ -362,8 +365,9 @@ class Estimator:
         return self.outputs[0].level
 
     def state_deviations(self) -> Array:
-        """Standard deviations of θ [rad] and θ̇ [rad/s], the uncertainty of parameters and calibration included; that of
-        the level, too, which has the noise of the samples, and does not know the motion while it waits."""
+        """Return standard deviations of θ [rad] and θ̇ [rad/s], the uncertainty of parameters and calibration
+        included; that of the level, too, which has the noise of the samples, and does not know the motion while it
+        waits."""
         sigma = self._with_considered(self.belief.joint_factor, self.belief.errors)[len(self.scale.names) :]
         if not self.detrended:
             return sigma
@@ -375,17 +379,18 @@ class Estimator:
         return total
 
     def _with_considered(self, factor: Array, errors: Array) -> Array:
-        """Standard deviations of what has the factor `factor`, and `errors` by a unit of each considered error."""
+        """Return standard deviations of what has the factor `factor`, and `errors` by a unit of each considered
+        error."""
         return cdkf.deviations(np.concatenate((factor, errors * self.considered_sigma), axis=1))
 
     def parameters(self) -> tuple[Array, Array]:
-        """The model's parameters in its units, and their standard deviations to first order."""
+        """Return the model's parameters in its units, and their standard deviations to first order."""
         w, n = self.belief.w, len(self.scale.names)
         sigma = self._with_considered(self.belief.w_factor, self.belief.errors[:n])
         return self.scale.physical(w), self.scale.slope(w) * sigma
 
     def dynamics(self) -> tuple[Array, Array]:
-        """Natural frequency [Hz] and damping ratio [1] of the estimate; standard deviations by sigma points."""
+        """Return natural frequency [Hz] and damping ratio [1] of the estimate; standard deviations by sigma points."""
         points = self.scale.physical(cdkf.draw(self.belief.w, self.belief.w_factor))
         values = self.model.dynamics(points, self.rest)
         _, first, second = cdkf.differences(values)
@@ -400,7 +405,7 @@ class Estimator:
 def align(samples: Mapping[str, Array], settings: Mapping[str, float]) -> tuple[Start, int]:
     """Where the firmware starts after `align_time`, and how many samples that took (at least one).
 
-    The trim is the mean angle; the state is the last sample, as uncertain as its noise. Raises ValueError if that
+    The trim is the mean angle; the state is the last sample, as uncertain as its noise. Raise ValueError if that
     sample is not valid, for then the firmware goes on aligning.
     """
     time = samples["time_s"]
@@ -417,7 +422,7 @@ def align(samples: Mapping[str, Array], settings: Mapping[str, float]) -> tuple[
 
 
 def columns(estimator: Estimator) -> tuple[str, ...]:
-    """Of what `run` returns."""
+    """Return the columns of what `run` returns."""
     names = estimator.scale.names
     return (
         *("theta", "theta_dot", "theta_sigma", "theta_dot_sigma"),
@@ -428,7 +433,7 @@ def columns(estimator: Estimator) -> tuple[str, ...]:
 
 
 def run(estimator: Estimator, samples: Mapping[str, Array], first: int = 0, every: int = 1) -> dict[str, Array]:
-    """Steps through the samples from index `first` on; estimates after every `every`th of them, an array a column.
+    """Step through the samples from index `first` on; estimates after every `every`th of them, an array a column.
 
     `samples`: time_s, theta, theta_dot, z_ddot, tau_m and theta_valid, theta_dot_valid, z_ddot_valid, each of shape
     (N,); an invalid tau_m must already be 0. grip_force [N] may be missing, or NaN.

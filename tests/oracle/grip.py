@@ -59,7 +59,8 @@ class Grip:
     def step(
         self, measured: float | None, x: Array, u: tuple[float, ...], errors: Array, trim: float, dt: float
     ) -> tuple[float, Array] | None:
-        """The force [N] that the filter takes and what a unit of each considered error adds to it by the inputs, (k,).
+        """Return the force [N] that the filter takes and what a unit of each considered error adds to it by the inputs,
+        (k,).
 
         None where it is missing or not believed. `measured`: of the sample [N]; `x` and the mean inputs `u` as for a
         prediction, `errors` (2, k) of the inputs.
@@ -82,12 +83,12 @@ class Grip:
         return force, (self.first_moment * cosine * errors[0] - errors[1]) / lever.length
 
     def expected(self, before: Array, after: Array, dt: float) -> Array:
-        """The forces (N,) of states (2, N) before and after the step."""
+        """Return the forces (N,) of states (2, N) before and after the step."""
         needed: Array = self.inertia * (after[1] - before[1]) / dt + self._own(before) - self.applied_torque
         return needed / self.lever.length
 
     def _own(self, x: Array) -> Array:
-        """Torque of the lever's own damper and spring [N m]."""
+        """Return torque of the lever's own damper and spring [N m]."""
         torque: Array = self.lever.damping * x[1] + self.lever.stiffness * (x[0] - self.rest)
         return torque
 
@@ -102,19 +103,19 @@ class Grip:
         self.missing = seconds(0.0)
 
     def noise(self, dt: float) -> float:
-        """Standard deviation of the force. A constant gain error counts as white noise, of the density at which
-        walking parameters are as certain as it is."""
+        """Return standard deviation of the force. A constant gain error counts as white noise, of the density at
+        which walking parameters are as certain as it is."""
         walk = max(self.settings["k_p_walk"], WALK_LEAST)
         density = self.settings["grip_force_gain_sigma"] ** 4 / walk**2
         return math.sqrt(self.settings["grip_force_noise"] ** 2 + self.square * density / dt)
 
     def begin(self) -> None:
-        """The level begins anew where it is."""
+        """Start the level again where it is."""
         if self.level is not None:
             self.level.begin(self.level.level)
 
     def end_block(self, rate: float, period: float, counts: bool) -> None:
-        """Compares sensor and motion, after a block of learning that ends at the rate θ̇."""
+        """Compare sensor and motion, after a block of learning that ends at the rate θ̇."""
         self.elapsed += period
         self.counts = self.counts and counts
         if self.elapsed > BLOCK:

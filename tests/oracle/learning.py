@@ -35,7 +35,7 @@ SURPRISES = (1.2, 2.0)  # at a change: from which on there is any of it, and at 
 
 
 def seconds(value: float) -> np.float32:
-    """A time as the firmware has it."""
+    """Return a time as the firmware has it."""
     return np.float32(value)
 
 
@@ -100,12 +100,12 @@ class Learning:
     # --- one sample ------------------------------------------------------------------------------------------------
 
     def add(self, innovation: Innovation, valid: NDArray[np.bool_], counts: bool) -> None:
-        """What a sample says of the noise."""
+        """Add what a sample says of the noise."""
         if self.adapted and counts:
             self.noise.add(innovation, valid)
 
     def step(self, duration: float, lesson: Lesson, before: Callable[[float], None] = lambda period: None) -> None:
-        """The parameters learn once every learn_period; a sample that is half a sample_period early is on time.
+        """Let the parameters learn once every learn_period; a sample that is half a sample_period early is on time.
 
         `before` is called before they do, with the time since they did [s].
         """
@@ -152,7 +152,7 @@ class Learning:
     # --- the verdict -------------------------------------------------------------------------------------------------
 
     def _verdict(self, period: np.float32, lesson: Lesson) -> str:
-        """The first that holds. An arm is known that was, two KEEP_PERIODs ago."""
+        """Return the first that holds. An arm is known that was, two KEEP_PERIODs ago."""
         if self.adapted and self._is_noise(period, lesson.surprise):
             return "noise"
         if not lesson.measured:
@@ -164,7 +164,7 @@ class Learning:
         return "new" if self.trust < 1.0 or self.since_change < TRANSIENT else "learning"
 
     def _is_noise(self, period: np.float32, mean_square: float) -> bool:
-        """A change of a known arm has not explained the innovations, or they are still too large."""
+        """Return whether a change of a known arm has not explained the innovations, or they are still too large."""
         if self.verdict == "noise":
             return mean_square > EXPLAINED
         known = self.kept[1].trust >= 1.0
@@ -189,8 +189,8 @@ class Learning:
         return self.settings["change_walk"] if verdict == "regrip" else 0.0
 
     def _learn(self, period: np.float32) -> tuple[Array, Array]:
-        """The change of w, and by how much its variance shrinks. At first information counts in part: far from the
-        truth the sensitivities are wrong."""
+        """Return the change of w, and by how much its variance shrinks. At first information counts in part: far
+        from the truth the sensitivities are wrong."""
         if self.belief.pending:
             caution = seconds(self.settings["caution_time"])
             more = period / caution if period < caution else seconds(1.0)
@@ -219,7 +219,7 @@ class Learning:
             self.disturbance = part * DISTURBANCE * noise
 
     def _has_changed(self, correction: Array, variance: Array, period: float) -> bool:
-        """Whether the corrections say so; soon after another change of a known arm only."""
+        """Return whether the corrections say so; soon after another change of a known arm only."""
         detected = self.change.step(correction, variance, period)
         known = self.kept[1].trust >= 1.0
         again = self.since_change > seconds(self.settings["change_memory"]) and known
@@ -269,7 +269,7 @@ class Learning:
         return 1.0 / self.settings["forgetting_time"] if excited and self.adaptation == "forgetting" else 0.0
 
     def _adapt_walk(self, correction: Array, period: float, excited: bool) -> None:
-        """Sets q and growth for the next time from the last correction of w, `period` [s] after the one before."""
+        """Set q and growth for the next time from the last correction of w, `period` [s] after the one before."""
         self.growth = self._growth(excited)
         if self.adaptation == "robbins_monro":  # 1951: a running average of what the drift of w says the walk is
             memory = self.settings["robbins_monro_memory"]

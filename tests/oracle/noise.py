@@ -36,7 +36,7 @@ class NoiseEstimation:
         self.begin()
 
     def begin(self) -> None:
-        """A new window."""
+        """Start a new window."""
         self.elapsed = np.float32(0.0)
         self.samples = np.zeros(2)
         self.squares = np.zeros(2)  # of the whitened innovations
@@ -45,7 +45,7 @@ class NoiseEstimation:
         self.response_square = 0.0
 
     def add(self, innovation: Innovation, valid: NDArray[np.bool_]) -> None:
-        """A sample: its outputs whitened in order, the second given the first."""
+        """Add a sample: its outputs whitened in order, the second given the first."""
         white = np.linalg.solve(innovation.factor, innovation.value)
         response = np.linalg.solve(innovation.factor, innovation.response)
         self.samples[valid] += 1.0
@@ -55,7 +55,7 @@ class NoiseEstimation:
         self.response_square += float(response @ response)
 
     def end_block(self, period: np.float32, part: float = 1.0) -> bool:
-        """Set the noise at the end of that part of a window, `period` [s] later; return whether it was far too small."""
+        """Set the noise at the end of that part of a window, `period` [s] on; return whether it was far too small."""
         self.elapsed += period
         if self.window <= 0.0 or self.elapsed < np.float32(self.window) * np.float32(part):
             return False
@@ -70,7 +70,7 @@ class NoiseEstimation:
         return far_too_small
 
     def _correct_output(self, i: int, starved: bool) -> float:
-        """Sets the noise of output i; returns the factor by which it was wrong. It counts as far as the innovation is
+        """Set the noise of output i; return the factor by which it was wrong. It counts as far as the innovation is
         noise; outliers always count. With too little gain innovations are too large although the noise is right."""
         excess = math.sqrt(self.squares[i] / self.samples[i])
         factor = excess if excess > OUTLIERS else 1.0 + self.share[i] * (excess - 1.0)

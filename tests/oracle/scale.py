@@ -32,7 +32,7 @@ class Scale:
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, float], model: str) -> "Scale":
-        """The rows of firmware/lever_settings.def that `model` uses."""
+        """Return the rows of firmware/lever_settings.def that `model` uses."""
         if model not in PARAMETERS:
             raise ValueError(f'model: "{model}" is none of {", ".join(PARAMETERS)}')
         names = PARAMETERS[model]
@@ -44,7 +44,7 @@ class Scale:
         return cls(names, True, guess, np.ones(len(names)), sigma, walk**2)
 
     def physical(self, w: Array) -> Array:
-        """Parameters in the units of the model, of w (n,) or (n, N)."""
+        """Return parameters in the units of the model, of w (n,) or (n, N)."""
         shape = (-1,) + (1,) * (w.ndim - 1)
         guess = self.guess.reshape(shape)
         p: Array = guess * np.exp(w) if self.positive else guess + self.unit.reshape(shape) * w

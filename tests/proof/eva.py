@@ -65,7 +65,7 @@ class Proof:
 
 
 def prove(name: str, sources: Sequence[Path] = ()) -> Proof:
-    """Runs a harness; `sources` take the place of the firmware's. Raises EvaError."""
+    """Run a harness; `sources` take the place of the firmware's. Raise EvaError."""
     files = [FOLDER / f"{name}.c", *(sources or [FIRMWARE / source for source in SOURCES[name]])]
     cpp = f"-cpp-extra-args=-I{FIRMWARE} -I{FOLDER}"
     command = [PROGRAM, *_OPTIONS, cpp, *_SPECIAL.get(name, ()), *map(str, files)]

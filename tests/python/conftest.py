@@ -68,7 +68,7 @@ class PuppetBus(can.BusABC):
         return self._queue.popleft() if self._queue else None
 
     def decoded(self, name: str) -> list[dict[str, float]]:
-        """The contents of the frames it got of one message."""
+        """Return the contents of the frames it got of one message."""
         wanted = codec.message(name).frame_id
         return [codec.decode(identifier, data)[1] for identifier, data in self.sent if identifier == wanted]
 
@@ -76,19 +76,19 @@ class PuppetBus(can.BusABC):
 def estimate(
     theta: float = 0.0, theta_dot: float = 0.0, innovation: float | None = 1.5, **more: float
 ) -> tuple[str, dict[str, Any]]:
-    """A STATE_ESTIMATE for a PuppetBus."""
+    """Return a STATE_ESTIMATE for a PuppetBus."""
     return "STATE_ESTIMATE", {"theta": theta, "theta_dot": theta_dot, "innovation": innovation, **more}
 
 
 def health(mode: str = "run", *faults: str, restarts: int = 0, excitation: float = 0.1) -> tuple[str, dict[str, Any]]:
-    """A HEALTH for a PuppetBus."""
+    """Return a HEALTH for a PuppetBus."""
     flags = {f"fault_{name}": int(name in faults) for name in enum_names("lever_fault").values()}
     return "HEALTH", {"mode": mode, "restarts": restarts, "excitation": excitation, **flags}
 
 
 @pytest.fixture(scope="session", autouse=True)
 def _ctrl_c() -> None:
-    """Ends a process also where the tests are started in the background of a shell, which ignores it."""
+    """Restore SIGINT where the tests are started in the background of a shell, which ignores it."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -136,7 +136,7 @@ def load(tmp_path: Path) -> Callable[..., Scenario]:
 
 @pytest.fixture
 def short() -> Scenario:
-    """Half a second of the steady scenario."""
+    """Return half a second of the steady scenario."""
     return scenario.load("steady", ["duration=0.5 s", "converged_after=0.1 s"])
 
 
@@ -159,7 +159,7 @@ Samples = Callable[[int, int], list[tuple[Frame, Frame]]]
 
 
 def swing(first: int, count: int) -> list[tuple[Frame, Frame]]:
-    """The LEVER_SAMPLE and BASE_SAMPLE of a swinging lever, at 1 kHz from sample `first`."""
+    """Return the LEVER_SAMPLE and BASE_SAMPLE of a swinging lever, at 1 kHz from sample `first`."""
     lever, base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
     frames = []
     for k in range(first, first + count):
@@ -196,7 +196,7 @@ def _message(frame: Frame) -> can.Message:
 
 @pytest.fixture
 def message() -> Callable[[Frame], can.Message]:
-    """A frame as a can.Message."""
+    """Return a frame as a can.Message."""
     return _message
 
 
@@ -214,7 +214,7 @@ def exchange() -> Callable[[can.BusABC, tuple[Frame, Frame]], list[can.Message]]
 
 @pytest.fixture(scope="session")
 def installed() -> str:
-    """The version of the installed package; without it the test is skipped."""
+    """Return the version of the installed package; without it the test is skipped."""
     try:
         return metadata.version("lever-cdkf")
     except metadata.PackageNotFoundError:
@@ -223,7 +223,7 @@ def installed() -> str:
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    """Of all tests, each of which begins anew."""
+    """Yield the browser of all tests, each of which begins anew."""
     from python.watch.browser import Browser
 
     with Browser() as started:
@@ -252,7 +252,7 @@ class Session:
 
 
 def simulated(name: str, folder: Path, *overrides: str) -> Session:
-    """A short run of a scenario."""
+    """Return a short run of a scenario."""
     short = scenario.load(name, [*SHORT, *overrides])
     return Session(simulate(short, out_dir=folder), folder, short.config)
 

@@ -37,7 +37,7 @@ SourceTree = Callable[[str], Path]
 def _made(
     tmp_path_factory: pytest.TempPathFactory, build_dir: Path, recording: Path, aircraft: Path
 ) -> Callable[[str], Path]:
-    """Makes the folders of source_tree()."""
+    """Make the folders of source_tree()."""
 
     @cache
     def make(name: str) -> Path:
@@ -65,14 +65,14 @@ def source_tree(_made: SourceTree, build_dir: Path, monkeypatch: pytest.MonkeyPa
 
 
 def quick_campaign() -> str:
-    """The spec of that name with 9 of its 100 flights."""
+    """Return the spec of that name with 9 of its 100 flights."""
     text = (tools.ROOT / "sil/lever_sil/campaign/specs/quick.toml").read_text(encoding="utf-8")
     return text.replace("steps = 5", "steps = 3").replace("seeds = 4", "seeds = 1")
 
 
 @pytest.fixture(scope="session")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A few seconds of a simulation, estimates included, as candump would have recorded them."""
+    """Return a few seconds of a simulation, estimates included, as candump would have recorded them."""
     folder = tmp_path_factory.mktemp("recording")
     simulated(folder, 4)
     return folder / "bus.log"
@@ -80,7 +80,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same lever as an aircraft records it that knows nothing of lever.dbc: a database, and logs."""
+    """Return the same lever as an aircraft records it that knows nothing of lever.dbc: a database, and logs."""
     folder = tmp_path_factory.mktemp("aircraft")
     (folder / "aircraft.dbc").write_text(AIRCRAFT, encoding="ascii")
     trace = simulated(folder, 21).trace
@@ -118,7 +118,7 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def simulated(folder: Path, seconds: float) -> Result:
-    """A run, which leaves its log in a folder."""
+    """Return a run, which leaves its log in a folder."""
     steady = scenario.load("steady", [f"duration={seconds} s", "converged_after=2 s", "limits={}"])
     result = simulate(steady, channel="vcan0")
     (folder / "bus.log").write_bytes(b"".join(buslog.lines(result.frames, "vcan0")))

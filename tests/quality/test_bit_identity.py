@@ -29,14 +29,15 @@ BUILDS = [
 
 
 def build(compiler: str, flags: str, core: list[Path], folder: Path, build_dir: Path) -> Path:
-    """The program of embedded/ with the core, its sources or a library, with the flags of the build and others."""
+    """Return the program of embedded/ with the core, its sources or a library, with the flags of the build and
+    others."""
     command = [tools.first_installed(compiler), *tools.core_flags(build_dir), *flags.split()]
     tools.assert_silent([*command, *PROGRAM, *core, "-lm", "-o", folder / "embedded"])
     return folder / "embedded"
 
 
 def output(*command: str | Path) -> list[str]:
-    """What it prints."""
+    """Return what it prints."""
     result = tools.run(command)
     assert result.returncode == 0, result.stdout
     return result.stdout.splitlines()
@@ -44,7 +45,7 @@ def output(*command: str | Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def as_shipped(tmp_path_factory: pytest.TempPathFactory, build_dir: Path) -> Path:
-    """The program with the library of the build."""
+    """Return the program with the library of the build."""
     library = build_dir / "firmware/liblever_cdkf.a"
     return build("cc|gcc|clang", "-O1", [library], tmp_path_factory.mktemp("as_shipped"), build_dir)
 

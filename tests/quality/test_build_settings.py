@@ -47,7 +47,7 @@ def configure(settings: str | bytes, folder: Path) -> subprocess.CompletedProces
 
 
 def other_than_default() -> Config:
-    """Every setting and choice, none at its default."""
+    """Return every setting and choice, none at its default."""
     middle = {
         row.name: 0.5 * (row.default + (row.least if row.default == row.greatest else row.greatest))
         for row in settings_table()

@@ -31,7 +31,8 @@ FACADE = [tools.FIRMWARE / "app" / name for name in ("lever.c", "link.c", "link_
 
 @pytest.fixture(scope="module")
 def programs(tmp_path_factory: pytest.TempPathFactory, build_dir: Path) -> Path:
-    """The folder of `single` and `double`; double.h turns every float into a double, and has libm's functions."""
+    """Return the folder of `single` and `double`; double.h turns every float into a double, and has libm's
+    functions."""
     folder = tmp_path_factory.mktemp("endurance")
     flags = [flag for flag in tools.core_flags(build_dir) if not flag.startswith("-W")]
     compiler: list[str | Path] = [tools.first_installed("cc|gcc|clang"), *flags, "-O2", "-I", tools.ROOT / "tests/unit"]

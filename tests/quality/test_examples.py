@@ -51,7 +51,7 @@ def parsers() -> dict[str, ArgumentParser]:
 
 
 def examples(command: str) -> list[str]:
-    """The lines to type, without what is said beside them."""
+    """Return the lines to type, without what is said beside them."""
     _, _, text = (parsers()[command].epilog or "").partition(":\n")
     typed = re.findall(r"^  ((?:lever|lever_can|candump)\b[^\\\n]*(?:\\\n[^\\\n]*)*)", text, re.MULTILINE)
     return [re.sub(r" {3,}(?=\S).*$", "", line) if "\\" not in line else line for line in typed]

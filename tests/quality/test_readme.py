@@ -73,7 +73,7 @@ BLOCKS: list[Block] = sorted(
 
 
 def cases(*languages: str) -> list[object]:
-    """The blocks of these languages, as parameters."""
+    """Return the blocks of these languages, as parameters."""
     return [
         pytest.param(
             block,
@@ -126,7 +126,7 @@ def test_whatever_a_page_has_been_built_with_makes_lever_can() -> None:
 
 
 def anchors(page: Path) -> set[str]:
-    """The headings of a page as the addresses that GitHub gives them."""
+    """Return the headings of a page as the addresses that GitHub gives them."""
     headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 

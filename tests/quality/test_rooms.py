@@ -68,7 +68,7 @@ ORACLE = "tests/oracle"
 
 
 def imported(file: Path, path: str) -> Iterator[str]:
-    """The modules of this project that a file imports, as paths, like its own: "lever_cdkf/can/codec"."""
+    """Yield the modules of this project that a file imports, as paths, like its own: "lever_cdkf/can/codec"."""
     folder = path.split("/")[:-1]
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -83,7 +83,7 @@ def imported(file: Path, path: str) -> Iterator[str]:
 
 
 def place(path: str, root: Path) -> str:
-    """The folder of a package that a module is in; "" beside the folders."""
+    """Return the folder of a package that a module is in; "" beside the folders."""
     parts = path.split("/")
     return "/".join(parts[:2]) if len(parts) > 1 and (root / PACKAGES[parts[0]] / parts[0] / parts[1]).is_dir() else ""
 

@@ -17,7 +17,7 @@ Prove = Callable[..., int]
 
 @pytest.fixture
 def tree(tmp_path: Path) -> Path:
-    """A source tree with a copy of the program, and an input a/x."""
+    """Return a source tree with a copy of the program, and an input a/x."""
     for name in ("tests/setup", "a/__pycache__", "build"):
         (tmp_path / name).mkdir(parents=True)
     for name in ("CMakeLists.txt", "CMakePresets.json", "pyproject.toml", "tests/CMakeLists.txt", "tests/conftest.py"):

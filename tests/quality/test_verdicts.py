@@ -27,7 +27,7 @@ COLUMNS = {
 
 
 def rows(name: str) -> Iterator[list[str]]:
-    """The cells of each row of NAME.def, as a reader gets to see them."""
+    """Yield the cells of each row of NAME.def, as a reader gets to see them."""
     text = (APP / f"{name}.def").read_text(encoding="utf-8")
     for arguments in re.findall(rf"^{name.upper()}\((.*)\)$", text, re.MULTILINE):
         *cells, meaning = re.fullmatch(r'(.*), "(.*)"', arguments).groups()  # type: ignore[union-attr]
@@ -35,7 +35,7 @@ def rows(name: str) -> Iterator[list[str]]:
 
 
 def cell(text: str) -> str:
-    """A cell of a .def file in words."""
+    """Return a cell of a .def file in words."""
     words = re.sub(r"ON\(EVIDENCE_(\w+)\)", r"\1", text)
     words = re.sub(r"^(EVIDENCE|VERDICT|LEVER_FAULT)_", "", words).replace(" |", ",")
     number = re.fullmatch(r"(-?[\d.]+)f", words)

@@ -22,7 +22,7 @@ NATIVE = ("lever.dbc", "lever_cdkf", "lever_bulk", "lever_innovations", "lever_l
 
 @pytest.fixture(scope="module")
 def installed(built: Built) -> Path:
-    """A folder with the package and nothing else, made by package/wheel.py."""
+    """Return a folder with the package and nothing else, made by package/wheel.py."""
     return built("wheel_test/installed", "build.wheel")
 
 

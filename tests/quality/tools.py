@@ -23,7 +23,7 @@ def core_sources() -> list[Path]:
 
 
 def core_flags(build_dir: Path) -> list[str]:
-    """What the build compiles the core with, but for optimisation; firmware/ is where it looks for headers."""
+    """Return what the build compiles the core with, but for optimisation; firmware/ is where it looks for headers."""
     entries = json.loads((build_dir / "compile_commands.json").read_text(encoding="utf-8"))
     commands = [shlex.split(entry["command"]) for entry in entries if entry["file"] == str(FIRMWARE / "filter/cdkf.c")]
     command = next(words for words in commands if "CMakeFiles/lever_cdkf.dir/" in words[words.index("-o") + 1])
@@ -31,17 +31,17 @@ def core_flags(build_dir: Path) -> list[str]:
 
 
 def python_tool(name: str) -> str:
-    """A program that is installed in the virtual environment that runs the tests."""
+    """Return a program that is installed in the virtual environment that runs the tests."""
     return str(Path(sys.executable).with_name(name))
 
 
 def first_installed(names: str) -> str:
-    """The first of the programs "a|b|c" that is there."""
+    """Return the first of the programs "a|b|c" that is there."""
     return next(path for name in names.split("|") if (path := shutil.which(name)))
 
 
 def run(command: Iterable[str | Path], cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """The finished process, with stdout and stderr together as its stdout."""
+    """Return the finished process, with stdout and stderr together as its stdout."""
     arguments = [str(part) for part in command]
     return subprocess.run(arguments, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
 

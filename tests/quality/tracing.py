@@ -23,7 +23,7 @@ class Trace:
 
 
 def requirements() -> dict[str, str]:
-    """Number and words of each."""
+    """Return number and words of each."""
     texts = ((ROOT / "firmware" / name).read_text(encoding="utf-8") for name in ("REQUIREMENTS.md", "SECURITY.md"))
     found = [row for text in texts for row in _ROW.findall(text)]
     assert len(dict(found)) == len(found), "a number stands twice"
@@ -31,7 +31,7 @@ def requirements() -> dict[str, str]:
 
 
 def traces(tests: Path = ROOT / "tests") -> list[Trace]:
-    """Of all tests."""
+    """Return the traces of all tests."""
     return [*_of_c(tests), *_of_python(tests)]
 
 

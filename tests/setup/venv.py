@@ -23,7 +23,7 @@ class SetupError(Exception):
 
 
 def succeeds(*command: str | Path) -> bool:
-    """Whether the command can be run and exits with 0; says nothing."""
+    """Return whether the command can be run and exits with 0; says nothing."""
     try:
         return subprocess.run(command, capture_output=True, check=False).returncode == 0
     except OSError:
@@ -31,14 +31,14 @@ def succeeds(*command: str | Path) -> bool:
 
 
 def is_usable(venv: Path) -> bool:
-    """Whether the environment has a pip, and the Python that is asked for now."""
+    """Return whether the environment has a pip, and the Python that is asked for now."""
     same_python = f"import sys; sys.exit(sys.version_info[:3] != {tuple(sys.version_info[:3])})"
     return succeeds(venv / "bin/python", "-c", same_python) and succeeds(venv / "bin/python", "-m", "pip", "--version")
 
 
 def create(venv: Path) -> None:
-    """Makes an empty environment with pip, whether or not this Python can bootstrap pip (Debian's without python3-venv
-    cannot)."""
+    """Make an empty environment with pip, whether or not this Python can bootstrap pip (Debian's without
+    python3-venv cannot)."""
     shutil.rmtree(venv, ignore_errors=True)
     if succeeds(sys.executable, "-m", "venv", venv):
         return

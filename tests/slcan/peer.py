@@ -30,7 +30,7 @@ class Frame:
 
 @functools.cache
 def library() -> tuple[cffi.FFI, Any]:
-    """The codec, compiled for this test run."""
+    """Return the codec, compiled for this test run."""
     compiler = next(path for name in COMPILERS.split("|") if (path := shutil.which(name)))
     header = FIRMWARE / "port/slcan/slcan.h"
     ffi = cffi.FFI()
@@ -74,7 +74,7 @@ class Peer:
                 self.received.append(as_frame(self._frame))
 
     def send(self, frame: Frame, time_ms: int = 0) -> bool:
-        """A frame to the host."""
+        """Return a frame to the host."""
         inner = {"id": frame.id, "length": frame.length, "data": frame.data.ljust(8, b"\0")}
         sent = self.ffi.new("slcan_frame_t *", {"frame": inner, "extended": frame.extended, "remote": frame.remote})
         return bool(self.lib.slcan_send(self._slcan, sent, time_ms))
@@ -87,14 +87,14 @@ class Peer:
 
 
 def as_frame(frame: Any) -> Frame:
-    """A slcan_frame_t."""
+    """Return a slcan_frame_t."""
     inner = frame.frame
     data = b"" if frame.remote else bytes(inner.data)[: inner.length]
     return Frame(inner.id, data, inner.length, bool(frame.extended), bool(frame.remote))
 
 
 def read_frame(line: bytes) -> Frame | None:
-    """What the codec reads in a line of an adapter, without its CR."""
+    """Return what the codec reads in a line of an adapter, without its CR."""
     ffi, lib = library()
     taken, frame = ffi.new("slcan_line_t *"), ffi.new("slcan_frame_t *")
     for byte in line + b"\r":

@@ -18,7 +18,7 @@ def program(build_dir: Path) -> str:
 
 
 def runs_with(program: str, folder: Path, *options: str) -> tuple[dict[str, str], int]:
-    """The choices and the CRC of the settings that it prints, which is a settings file."""
+    """Return the choices and the CRC of the settings that it prints, which is a settings file."""
     command = [program, "--pty", str(folder / "link"), "--verbose", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

@@ -58,7 +58,7 @@ class Line:
         os.set_blocking(self.end, False)
 
     def read_until(self, text: bytes) -> bytes:
-        """What comes, up to and including `text`."""
+        """Return what comes, up to and including `text`."""
         got = b""
         while text not in got:
             assert select.select([self.end], [], [], rig.PATIENCE_S)[0], f"{text!r} does not come after {got!r}"
@@ -146,7 +146,7 @@ def bytes_read(process: rig.LeverCan) -> int:
 
 
 def is_waiting(process: rig.LeverCan) -> bool:
-    """Whether it has nothing to do."""
+    """Return whether it has nothing to do."""
     return Path(f"/proc/{process.process.pid}/stat").read_text().rpartition(") ")[2].startswith("S")
 
 

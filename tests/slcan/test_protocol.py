@@ -23,14 +23,14 @@ def peer() -> Peer:
 
 
 def says(peer: Peer, data: bytes) -> bytes:
-    """The answer to bytes from the host."""
+    """Return the answer to bytes from the host."""
     peer.output.clear()
     peer.take(data)
     return bytes(peer.output)
 
 
 def hears(peer: Peer, frame: Frame, time_ms: int = 0) -> bytes:
-    """What the host gets of a frame."""
+    """Return what the host gets of a frame."""
     peer.output.clear()
     assert peer.send(frame, time_ms)
     return bytes(peer.output)

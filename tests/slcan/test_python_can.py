@@ -118,7 +118,8 @@ def test_lines_that_it_takes_for_a_frame_are_that_frame_or_none(monkeypatch: pyt
 
 
 def damaged_line(source: random.Random) -> bytes:
-    """A line with a frame, with or without a time stamp, in which up to two characters are changed, lost or doubled."""
+    """Return a line with a frame, with or without a time stamp, in which up to two characters are changed, lost or
+    doubled."""
     frame = random_frame(source)
     peer_line = f"{frame.id:08X}" if frame.extended else f"{frame.id:03X}"
     kind = ("R" if frame.extended else "r") if frame.remote else ("T" if frame.extended else "t")

@@ -22,7 +22,7 @@ NO_MACHINE = 125
 
 
 def main() -> int:
-    """The command line."""
+    """Return the command line."""
     parser = argparse.ArgumentParser(prog="python tests/vcan", description="Runs a command where a vcan0 is up.")
     parser.add_argument("--time-limit", type=float, default=600.0, metavar="SECONDS", help="default: %(default)g")
     parser.add_argument("--uml", action="store_true", help="in User-Mode Linux, even where this kernel has vcan")

@@ -39,7 +39,7 @@ _reports = pytest.StashKey[Reports]()
 
 @functools.cache
 def _obstacle() -> str | None:
-    """Why there is no place with a vcan0, in words; None if there is one."""
+    """Return why there is no place with a vcan0, in words; None if there is one."""
     try:
         if not place.kernel_has_vcan():
             uml.find_machine()
@@ -90,7 +90,7 @@ def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestR
 
 
 def _run_inside(session: pytest.Session) -> Reports:
-    """The reports by test; one without a report has died, and has a failure that shows what was last printed."""
+    """Return the reports by test; one without a report has died, and has a failure that shows what was last printed."""
     config = session.config
     items = [item for item in session.items if _belongs_inside(item)]
     tests = [str(config.rootpath / item.nodeid) for item in items]
@@ -121,7 +121,7 @@ def _run_inside(session: pytest.Session) -> Reports:
 
 @pytest.fixture
 def interface() -> Iterator[str]:
-    """A virtual CAN interface, up, new for this test."""
+    """Yield a virtual CAN interface, up, new for this test."""
     with rig.new_interface() as name:
         yield name
 
@@ -136,7 +136,8 @@ def host(interface: str) -> Iterator[rig.Host]:
 
 @pytest.fixture
 def start(build_dir: Path, tmp_path: Path, interface: str) -> Iterator[rig.Starter]:
-    """Starts lever_can on the interface with further options, and ends what is left of it after the test."""
+    """Yield a function that starts lever_can on the interface with further options; end what is left of it after the
+    test."""
     with ExitStack() as stack:
         yield lambda *options, supervised=False: stack.enter_context(
             rig.LeverCan(build_dir / "lever_can", interface, options, tmp_path, supervised=supervised)

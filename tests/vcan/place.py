@@ -33,7 +33,7 @@ def run(
     stderr: BinaryIO | None = None,
     force_uml: bool = False,
 ) -> int:
-    """Runs `command` in the current folder and returns its exit status. Errors as of uml.run()."""
+    """Run `command` in the current folder and return its exit status. Raise the errors of uml.run()."""
     variables = {**(os.environ if environment is None else environment), INSIDE: "1"}
     if force_uml or not kernel_has_vcan():
         return uml.run(command, environment=variables, time_limit_s=time_limit_s, stdout=stdout, stderr=stderr)
@@ -55,7 +55,7 @@ def run(
 
 @functools.cache
 def kernel_has_vcan() -> bool:
-    """Whether a network namespace with a vcan0 can be made here."""
+    """Return whether a network namespace with a vcan0 can be made here."""
     if shutil.which("unshare") is None or shutil.which("ip", path=_path()) is None:
         return False
     probe = [*_namespace(), sys.executable, "-c", _PROBE]
@@ -67,6 +67,6 @@ def _path() -> str:
 
 
 def _namespace() -> list[str]:
-    """The command that makes the namespace; it takes what is to be run in it as further arguments."""
+    """Return the command that makes the namespace; it takes what is to be run in it as further arguments."""
     user = () if os.geteuid() == 0 else ("--user", "--map-root-user")
     return ["unshare", *user, "--net", "env", f"PATH={_path()}", "sh", "-c", _UP, "sh"]

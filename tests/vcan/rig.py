@@ -41,7 +41,7 @@ def ip(*arguments: str) -> None:
 
 @contextmanager
 def new_interface() -> Iterator[str]:
-    """A virtual CAN interface, up, without a past."""
+    """Yield a virtual CAN interface that is up and has no past."""
     ip("link", "add", "dev", INTERFACE, "type", "vcan")
     try:
         ip("link", "set", INTERFACE, "up")
@@ -51,7 +51,7 @@ def new_interface() -> Iterator[str]:
 
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:
-    """Waits, at most PATIENCE_S, for something to become true."""
+    """Wait, at most PATIENCE_S, for something to become true."""
     end = time.monotonic() + PATIENCE_S
     while not condition():
         assert time.monotonic() < end, f"not within {PATIENCE_S:g} s: {what}"
@@ -60,7 +60,7 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
 
 @contextmanager
 def candump(interface: str, log: Path) -> Iterator[None]:
-    """Records the interface in `log`, from the marker that it starts with to the marker that it ends with."""
+    """Record the interface in `log`, from the marker that it starts with to the marker that it ends with."""
 
     def sees_marker(markers: int) -> bool:
         subprocess.run(["cansend", interface, MARKER], check=True)
@@ -79,7 +79,7 @@ def candump(interface: str, log: Path) -> Iterator[None]:
 
 
 def frames(log: Path) -> list[str]:
-    """Identifiers and data of a log in candump's format, in order, without the markers."""
+    """Return identifier and data of a log in candump's format, in order, without the markers."""
     written = [line.split()[2] for line in log.read_text().splitlines()]
     return [frame for frame in written if frame != MARKER]
 
@@ -118,11 +118,12 @@ class LeverCan:
         return self._stderr.read_text()
 
     def wait_for(self, complaint: str, times: int = 1) -> None:
-        """Waits until it has complained so often."""
+        """Wait until it has complained so often."""
         wait_until(lambda: self.stderr.count(complaint) >= times, f"{complaint!r} in {self.stderr!r}")
 
     def stop(self, with_signal: signal.Signals = signal.SIGTERM) -> dict[str, int]:
-        """Ends it as a user would; it must end well. Returns the totals of its last line by name, "frames in" etc."""
+        """Return ends it as a user would; it must end well. Returns the totals of its last line by name, "frames in"
+        etc."""
         self.process.send_signal(with_signal)
         status = self.process.wait(PATIENCE_S)
         assert status == 0, f"exit status {status}: {self.stderr}"
@@ -145,12 +146,12 @@ STATE_ESTIMATE, MOTOR_COMMAND = 0x210, 0x215
 
 
 def torques(answers: Iterable[Frame]) -> list[float]:
-    """What the MOTOR_COMMANDs among them ask for [N m]."""
+    """Return what the MOTOR_COMMANDs among them ask for [N m]."""
     return [codec.decode(*frame)[1]["torque"] for frame in answers if frame[0] == MOTOR_COMMAND]
 
 
 def samples(first: int, count: int) -> Iterator[tuple[Frame, Frame]]:
-    """The frames of samples number first, first + 1, ... at 1 kHz, of a lever that swings on a bouncing base."""
+    """Yield the frames of samples number first, first + 1, ... at 1 kHz, of a lever that swings on a bouncing base."""
     for k in range(first, first + count):
         phase = 2.0 * math.pi * 3.0 * k * 1e-3
         lever = {"theta": 0.35 + 0.02 * math.sin(phase), "theta_dot": 0.377 * math.cos(phase), "tau_m": 0.0}
@@ -176,12 +177,12 @@ class Host:
         )
 
     def reopen(self, interface: str) -> None:
-        """Goes on with the next sample on an interface that was down or away."""
+        """Go on with the next sample on an interface that was down or away."""
         self.bus.shutdown()
         self.bus = Host.on(interface).bus
 
     def send(self, frame: Frame) -> None:
-        """Sends, again and again while there is no room."""
+        """Send, again and again while there is no room."""
         message = can.Message(arbitration_id=frame[0], data=frame[1], is_extended_id=False)
         wait_until(lambda: self._has_sent(message), "room to send")
 
@@ -195,7 +196,7 @@ class Host:
         return True
 
     def run(self, count: int) -> list[Frame]:
-        """Sends the next `count` samples and returns all answers; each must end with its STATE_ESTIMATE."""
+        """Send the next `count` samples and return all answers; each must end with its STATE_ESTIMATE."""
         answers: list[Frame] = []
         for lever, base in samples(self.samples_sent, count):
             self.send(lever)
@@ -205,7 +206,7 @@ class Host:
         return answers
 
     def reach(self) -> int:
-        """Sends samples until the last one sent is answered, and returns the number of the first that was."""
+        """Send samples until the last one sent is answered, and return the number of the first that was."""
         answered: list[int] = []
 
         def last_is_answered() -> bool:
@@ -224,12 +225,12 @@ class Host:
         return answered[0]
 
     def _sample_of(self, estimate: can.Message) -> int:
-        """The latest sample sent whose time ends in the bits that a STATE_ESTIMATE has of it."""
+        """Return the latest sample sent whose time ends in the bits that a STATE_ESTIMATE has of it."""
         low = codec.decode(STATE_ESTIMATE, bytes(estimate.data))[1]["time_low"]
         return next(k for k in reversed(range(self.samples_sent)) if (1000 * k) & 0xFFFF == low)
 
     def answer(self) -> list[Frame]:
-        """What comes up to and including the next STATE_ESTIMATE."""
+        """Return what comes up to and including the next STATE_ESTIMATE."""
         frames: list[Frame] = []
         while not frames or frames[-1][0] != STATE_ESTIMATE:
             message = self.bus.recv(PATIENCE_S)
@@ -238,7 +239,7 @@ class Host:
         return frames
 
     def run_with_torque(self) -> None:
-        """Samples until the last one is answered with torque: the estimator runs, and dither has faded in."""
+        """Send samples until one is answered with torque: the estimator runs, and dither has faded in."""
         commander = Commander()
 
         def is_asked_for() -> bool:
@@ -249,16 +250,16 @@ class Host:
         wait_until(is_asked_for, "torque")
 
     def rest(self) -> list[Frame]:
-        """What comes until nothing has come for 0.2 s."""
+        """Return what comes until nothing has come for 0.2 s."""
         messages = iter(lambda: self.bus.recv(0.2), None)
         return [(message.arbitration_id, bytes(message.data)) for message in messages if message is not None]
 
     def nothing_more(self) -> bool:
-        """Whether no further frame comes."""
+        """Return whether no further frame comes."""
         return self.bus.recv(0.1) is None
 
 
 def in_process(count: int, **settings: float) -> list[Frame]:
-    """The answers to the first `count` samples of a firmware instance in this process."""
+    """Return the answers to the first `count` samples of a firmware instance in this process."""
     with LeverBus(settings={**SETTINGS, **settings}) as bus:
         return Host(bus).run(count)

@@ -22,7 +22,7 @@ def _machine() -> None:
 
 
 def processes() -> int:
-    """Processes of User-Mode Linux machines that were started from this process."""
+    """Process of User-Mode Linux machines that were started from this process."""
     listed = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout
     return listed.count(f"/lever-uml-{os.getpid()}-")
 

@@ -23,7 +23,7 @@ HEALTH, IDENTITY, LINK_HEALTH = 0x214, 0x217, 0x219
 
 
 def refusal(program: Path, interface: str) -> str:
-    """The one line with which lever_can says that it cannot use the interface."""
+    """Return the one line with which lever_can says that it cannot use the interface."""
     result = subprocess.run([program, "--can", interface], capture_output=True, text=True, timeout=rig.PATIENCE_S)
     assert result.returncode == 1
     assert result.stdout == ""

@@ -40,7 +40,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Log:
 
 
 def play(log: Log, interface: str) -> None:
-    """Sends the log at its own pace."""
+    """Send the log at its own pace."""
     subprocess.run(["canplayer", "-I", str(log.path), f"{interface}=lever"], check=True)
 
 

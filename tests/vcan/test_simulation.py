@@ -28,13 +28,13 @@ SHORTENED = {
 
 
 def lever_sim(scenario: str, *options: str) -> str:
-    """What `lever sim` prints about a short version of the scenario."""
+    """Return what `lever sim` prints about a short version of the scenario."""
     changes = [f"--set={key}={value}" for key, value in SHORTENED[scenario].items()]
     return lever("sim", scenario, *changes, *options)
 
 
 def settings_file(scenario: str, folder: Path) -> str:
-    """A file with the settings of the scenario, for lever_can."""
+    """Return a file with the settings of the scenario, for lever_can."""
     path = folder / "settings"
     path.write_text(lever_sim(scenario, "--settings"))
     return str(path)

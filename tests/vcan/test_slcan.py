@@ -18,7 +18,7 @@ ATTACHED = "slcan9"
 
 @contextmanager
 def running(*command: str) -> Iterator[subprocess.Popen[str]]:
-    """A program, until the end of the context."""
+    """Run a program until the end of the context."""
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
         yield process

@@ -21,7 +21,7 @@ PLACES: tuple[tuple[int, bool], ...] = ((0, False), (0x40, False), (0x18FF0000, 
 
 
 def samples(lever: int) -> Iterator[tuple[rig.Frame, rig.Frame]]:
-    """Of each lever others, 2 ms apart."""
+    """Yield the samples of each lever others, 2 ms apart."""
     for k in range(SAMPLES):
         phase = 2.0 * math.pi * (3.0 + 0.5 * lever) * k * PERIOD_US * 1e-6
         theta = {"theta": 0.35 + 0.02 * math.sin(phase), "theta_dot": 0.377 * math.cos(phase), "tau_m": 0.0}
@@ -33,7 +33,7 @@ def samples(lever: int) -> Iterator[tuple[rig.Frame, rig.Frame]]:
 
 
 def answer(bus: can.BusABC, place: tuple[int, bool]) -> list[rig.Frame]:
-    """Of one lever, up to its STATE_ESTIMATE, with the identifiers of lever.dbc."""
+    """Return the answer of one lever, up to its STATE_ESTIMATE, with the identifiers of lever.dbc."""
     frames: list[rig.Frame] = []
     while not frames or frames[-1][0] != STATE_ESTIMATE:
         message = bus.recv(rig.PATIENCE_S)
@@ -54,7 +54,7 @@ def alone(lever: int) -> list[rig.Frame]:
 
 @pytest.fixture
 def together(build_dir: Path, tmp_path: Path, interface: str) -> Iterator[Callable[[Sequence[int]], list[can.BusABC]]]:
-    """Starts the levers of PLACES with these numbers, and opens a bus to each."""
+    """Yield a function that starts the levers of PLACES with these numbers, and opens a bus to each."""
     with ExitStack() as stack:
 
         def start(which: Sequence[int]) -> list[can.BusABC]:

@@ -48,7 +48,7 @@ class Machine:
 
 
 def find_machine() -> Machine:
-    """Looks in LEVER_SYSROOT, then among the installed programs. Raises UmlError when a part is missing."""
+    """Look in LEVER_SYSROOT, then among the installed programs. Raise UmlError when a part is missing."""
     given = os.environ.get("LEVER_SYSROOT")
     sysroot = Path(given).resolve() if given else None
     kernel = _find_program("linux.uml", sysroot)
@@ -103,7 +103,7 @@ def _find_program(name: str, sysroot: Path | None) -> Path:
 def _init_script(
     machine: Machine, command: Sequence[str], cwd: Path, environment: Mapping[str, str], place: Path
 ) -> str:
-    """The first process of the machine: sets it up, runs the command, leaves the exit status in place/status.
+    """Return the first process of the machine: sets it up, runs the command, leaves the exit status in place/status.
 
     The command writes into pipes, not into the serial lines, so that it does not take them for a terminal. What it
     leaves running in the background is ended with it.
@@ -155,7 +155,7 @@ done
 
 @contextlib.contextmanager
 def _started(machine: Machine, place: Path, memory: str) -> Generator[tuple[subprocess.Popen[bytes], tuple[int, int]]]:
-    """The machine's process and where its two serial lines (the command's stdout and stderr) can be read.
+    """Yield the machine's process and where its two serial lines (the command's stdout and stderr) can be read.
 
     All its processes are in one new process group, which ends with this context; should we be killed ourselves, they
     get SIGTERM from the kernel.
@@ -189,7 +189,7 @@ def _started(machine: Machine, place: Path, memory: str) -> Generator[tuple[subp
 
 
 def _preloaded(place: Path) -> dict[str, str]:
-    """What makes the machine run on processors that are newer than it, as environment; xstate.c says why."""
+    """Return what makes the machine run on processors that are newer than it, as environment; xstate.c says why."""
     compiler = next((found for name in ("cc", "gcc", "clang") if (found := shutil.which(name))), None)
     if compiler is None:
         return {}
@@ -209,7 +209,7 @@ def end_group(process: subprocess.Popen[bytes]) -> None:
 
 
 def _memory_folder(memory: str) -> str:
-    """The folder for the file that is the machine's memory: it must allow execution and have room."""
+    """Return the folder for the file that is the machine's memory: it must allow execution and have room."""
     size = int(memory[:-1]) << {"M": 20, "G": 30}[memory[-1]]
     for folder in ("/dev/shm", tempfile.gettempdir(), "/var/tmp"):
         with contextlib.suppress(OSError):
@@ -220,7 +220,7 @@ def _memory_folder(memory: str) -> str:
 
 
 def _pass_on(process: subprocess.Popen[bytes], sinks: Mapping[int, BinaryIO], end: float) -> bool:
-    """Copies each line to its sink until the machine is off (True) or time.monotonic() reaches `end` (False)."""
+    """Copy each line to its sink until the machine is off (True) or time.monotonic() reaches `end` (False)."""
     with selectors.DefaultSelector() as selector:
         for reader in sinks:
             selector.register(reader, selectors.EVENT_READ)

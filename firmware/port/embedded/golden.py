@@ -53,7 +53,7 @@ static const uint8_t golden_input[][8] = {{
 
 
 def input_frames() -> list[tuple[int, bytes]]:
-    """Identifier and data of each frame: a lever that swings at 3 and 5 Hz, shaken by base and motor."""
+    """Return identifier and data of each frame: a lever that swings at 3 and 5 Hz, shaken by base and motor."""
     lever_sample, base_sample = (codec.encoder(name) for name in INPUTS)
     ids = [codec.database().get_message_by_name(name).frame_id for name in INPUTS]
     frames = []

@@ -25,14 +25,14 @@ class Section(NamedTuple):
 
 
 def sections(elf: Path, objdump: str) -> dict[str, Section]:
-    """Size and load address of each section, by the table that objdump prints."""
+    """Return size and load address of each section, by the table that objdump prints."""
     table = subprocess.run([objdump, "-h", "-w", elf], capture_output=True, text=True, check=True).stdout
     rows = [line.split() for line in table.splitlines() if line.strip()[:1].isdigit()]
     return {row[1]: Section(int(row[2], 16), int(row[4], 16)) for row in rows}
 
 
 def put_crc(elf: Path, objcopy: str, objdump: str) -> None:
-    """Fills .rom_crc of `elf`. Exits with a line when flash is not in one piece."""
+    """Fill .rom_crc of `elf`. Exits with a line when flash is not in one piece."""
     flash = elf.with_suffix(".flash")
     crc = elf.with_suffix(".crc")
     try:

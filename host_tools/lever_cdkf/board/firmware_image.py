@@ -17,7 +17,7 @@ _HEX_DATA, _HEX_END, _HEX_UPPER = 0, 1, 4
 
 
 def _pieces_of_elf(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Physical address and contents of each loaded segment of a 32-bit little-endian ELF file."""
+    """Yield physical address and contents of each loaded segment of a 32-bit little-endian ELF file."""
     header_offset, entry_size, entries = *struct.unpack_from("<I", data, 28), *struct.unpack_from("<HH", data, 42)
     for index in range(entries):
         kind, offset, _, address, size = struct.unpack_from("<5I", data, header_offset + index * entry_size)
@@ -26,7 +26,7 @@ def _pieces_of_elf(data: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def _pieces_of_hex(text: str) -> Iterator[tuple[int, bytes]]:
-    """Address and contents of each data record of an Intel HEX file. Raises ValueError."""
+    """Yield address and contents of each data record of an Intel HEX file. Raise ValueError."""
     upper = 0
     for line in text.split():
         record = bytes.fromhex(line.removeprefix(":"))
@@ -42,7 +42,8 @@ def _pieces_of_hex(text: str) -> Iterator[tuple[int, bytes]]:
 
 
 def flash_contents(path: Path) -> bytes:
-    """What `path` (.elf, .hex, .bin) puts into flash. Raises LeverError, also when it is not a whole image of ours.
+    """Return what `path` (.elf, .hex, .bin) puts into flash. Raise LeverError, also when it is not a whole image of
+    ours.
 
     The build ends an image with the CRC-32 of all before it (firmware/port/stm32f4/rom_crc.py), which is checked here.
     """

@@ -41,10 +41,10 @@ class QemuError(LeverError):
 
 @contextmanager
 def running(image: Path, *, machine: str = MACHINE, count_instructions: bool = False) -> Iterator[str]:
-    """Runs an SLCAN image on the emulated board until the end of the context; gives the channel for python-can's slcan.
+    """Run an SLCAN image on the emulated board until the end of the context; gives the channel for python-can's slcan.
 
     `machine` is QEMU's name of the board, whose first serial line is used. The image has answered when the context
-    begins. One at a time can open the channel. Raises QemuError.
+    begins. One at a time can open the channel. Raise QemuError.
     """
     check(image)
     options = ["-display", "none", "-monitor", "none", "-serial", "chardev:usart1", "-echr", _NO_ESCAPE]
@@ -68,7 +68,7 @@ def running(image: Path, *, machine: str = MACHINE, count_instructions: bool = F
 
 @contextmanager
 def one_processor() -> Iterator[None]:
-    """Keeps the calling thread, and what it starts meanwhile, on one of the processors that it may use.
+    """Keep the calling thread, and what it starts meanwhile, on one of the processors that it may use.
 
     QEMU's threads, and who talks to it, wait for each other byte by byte; on one processor that costs half.
     """
@@ -84,7 +84,7 @@ def one_processor() -> Iterator[None]:
 
 
 def check(image: Path) -> None:
-    """Raises QemuError if there is no QEMU, or `image` is not a program for ARM."""
+    """Raise QemuError if there is no QEMU, or `image` is not a program for ARM."""
     if shutil.which(PROGRAM) is None:
         raise QemuError(f"{PROGRAM} is not installed: {_INSTALL}")
     try:
@@ -101,7 +101,7 @@ def check(image: Path) -> None:
 
 
 def _wait_for_answer(process: subprocess.Popen[bytes], output: IO[str], address: tuple[str, int], image: Path) -> None:
-    """Returns when the SLCAN peer has told its version, and the line is quiet."""
+    """Return when the SLCAN peer has told its version, and the line is quiet."""
     end = time.monotonic() + _START_S
     while not _answers(address):
         if process.poll() is not None:
@@ -115,7 +115,7 @@ def _wait_for_answer(process: subprocess.Popen[bytes], output: IO[str], address:
 
 
 def _answers(address: tuple[str, int]) -> bool:
-    """Whether the SLCAN peer tells its version within a moment."""
+    """Return whether the SLCAN peer tells its version within a moment."""
     heard = b""
     try:
         with socket.create_connection(address, timeout=_ASK_S) as line:

@@ -53,11 +53,11 @@ class Buses:
         self.pointer = ffi.new("bulk_buses_t *")
 
     def names(self) -> list[str]:
-        """All so far."""
+        """Return all so far."""
         return [ffi.string(self.pointer.name[i]).decode(errors="replace") for i in range(self.pointer.count)]
 
     def index(self, name: str) -> int | None:
-        """The place of a name, which is added if it is new; None when it is too long or there are too many."""
+        """Return the place of a name, which is added if it is new; None when it is too long or there are too many."""
         names = self.names()
         if name in names:
             return names.index(name)
@@ -80,7 +80,7 @@ class Parsed(NamedTuple):
 
 
 def parse(text: bytes, buses: Buses) -> Parsed:
-    """The frames in the whole lines of a text in candump's format."""
+    """Return the frames in the whole lines of a text in candump's format."""
     frames = np.empty(len(text) // _SHORTEST_LINE + 1, FRAME)
     parsed = ffi.new("bulk_parsed_t *")
     room = ffi.from_buffer("bulk_frame_t[]", frames)
@@ -89,7 +89,7 @@ def parse(text: bytes, buses: Buses) -> Parsed:
 
 
 def format_lines(frames: Frames, bus: str) -> NDArray[np.uint8]:
-    """The frames, all with 11-bit identifiers, as lines in candump's format, to be written as bytes."""
+    """Return the frames, all with 11-bit identifiers, as lines in candump's format, to be written as bytes."""
     text = np.empty(len(frames) * _LONGEST_WRITTEN, np.uint8)
     source = ffi.from_buffer("bulk_frame_t[]", np.ascontiguousarray(frames))
     size = _lib.bulk_format(source, len(frames), bus.encode(), ffi.from_buffer("char[]", text))
@@ -117,7 +117,7 @@ class Feeder:
         return int(self._feeder.refused)
 
     def feed(self, frames: Frames) -> Iterator[tuple[Frames, Rows]]:
-        """Feeds frames of one bus, all classic data frames with 11-bit identifiers, and gives pieces of
+        """Feed the frames of one bus, all classic data frames with 11-bit identifiers, and yield pieces of
 
         - the frames fed, each followed by its answers (flag ANSWER), valid until the next piece, and
         - the rows of the samples that are complete with it; the last one is kept back until flush().
@@ -134,7 +134,7 @@ class Feeder:
             yield self._out[: self._fed.out], self._rows[: self._fed.rows].copy()
 
     def flush(self) -> Rows:
-        """The row of the last sample, if there was one."""
+        """Return the row of the last sample, if there was one."""
         rows = np.empty(1 if self._feeder.has_row else 0, ROW)
         if self._feeder.has_row:
             rows[0] = np.frombuffer(ffi.buffer(ffi.addressof(self._feeder, "row")), ROW)[0]

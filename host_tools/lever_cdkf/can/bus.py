@@ -116,7 +116,7 @@ class LeverBus(BusABC):
             self._answer(is_sample)
 
     def recv(self, timeout: float | None = None) -> Message | None:
-        """The oldest frame not yet received; None after `timeout` seconds, or at once where none can come.
+        """Return the oldest frame not yet received; None after `timeout` seconds, or at once where none can come.
 
         Overrides BusABC.recv, which would go on asking until the timeout has passed (without one, for ever).
         """
@@ -138,15 +138,15 @@ class LeverBus(BusABC):
                 return message
 
     def __iter__(self) -> Iterator[Message]:
-        """What recv() returns, until it returns None: who has sent alone gets every answer, and an end."""
+        """Yield what recv() returns, until it returns None: who has sent alone gets every answer, and an end."""
         while (message := self.recv()) is not None:
             yield message
 
     def flush_tx_buffer(self) -> None:
-        """Does nothing: what was sent has arrived."""
+        """Do nothing: what was sent has arrived."""
 
     def shutdown(self) -> None:
-        """Ends the bus; a thread that waits in recv() gets a CanOperationError. May be called again."""
+        """End the bus; a thread that waits in recv() gets a CanOperationError. May be called again."""
         super().shutdown()
         self._queue.put(None)
 
@@ -157,7 +157,7 @@ class LeverBus(BusABC):
             return None
 
     def _advance(self, time_us: int) -> None:
-        """Continues the time by a sample's 32 bits; less than half their range ahead is forward, all else is late."""
+        """Continue the time by a sample's 32 bits; less than half their range ahead is forward, all else is late."""
         if self._time_us is None:
             self._time_us = time_us
         else:
@@ -166,7 +166,7 @@ class LeverBus(BusABC):
         self._timestamp = self._time_us * 1e-6
 
     def _answer(self, is_sample: bool) -> None:
-        """Queues what the estimator has to say after a frame, of which a sample is to be taken first."""
+        """Queue what the estimator has to say after a frame, of which a sample is to be taken first."""
         estimator = self.estimator
         if is_sample:
             estimator.step()

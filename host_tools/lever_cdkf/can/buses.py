@@ -37,8 +37,8 @@ def add_bus_options(parser: argparse.ArgumentParser) -> None:
 
 
 def chosen_options(args: argparse.Namespace, *, fd: bool = False) -> dict[str, Any]:
-    """Options for open_bus(), numbers and truth values as such; with `fd` of a bus with CAN FD, which other interfaces
-    than SocketCAN need more options for. Raises LeverError."""
+    """Return options for open_bus(), numbers and truth values as such; with `fd` of a bus with CAN FD, which other
+    interfaces than SocketCAN need more options for. Raise LeverError."""
     from can.util import cast_from_string
 
     options: dict[str, Any] = {"fd": True} if fd and args.interface == "socketcan" else {}
@@ -51,7 +51,7 @@ def chosen_options(args: argparse.Namespace, *, fd: bool = False) -> dict[str, A
 
 
 def check_others_can_be_heard(interface: str) -> None:
-    """Raises LeverError for an interface that stays inside this process."""
+    """Raise LeverError for an interface that stays inside this process."""
     if interface in _IN_PROCESS:
         raise LeverError(
             f"interface {interface} stays inside one process, so there is nothing else to receive: give a bus such as "
@@ -60,7 +60,8 @@ def check_others_can_be_heard(interface: str) -> None:
 
 
 def open_bus(interface: str, channel: str | None, options: Mapping[str, Any], *, translated: bool = True) -> can.BusABC:
-    """A python-can bus; `translated`: with the identifiers of lever.dbc, whatever they are on it. Raises LeverError."""
+    """Return a python-can bus; `translated`: with the identifiers of lever.dbc, whatever they are on it. Raises
+    LeverError."""
     import can
 
     from .protocol_ahead import read_ahead

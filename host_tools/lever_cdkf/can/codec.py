@@ -50,12 +50,12 @@ def database() -> Database:
 
 @cache
 def contract() -> int:
-    """The version of lever.dbc, which an estimator tells in IDENTITY."""
+    """Return the version of lever.dbc, which an estimator tells in IDENTITY."""
     return int(database().version or 0)
 
 
 def message(key: str | int) -> Message:
-    """A message of the DBC by name or identifier. Raises CodecError."""
+    """Return a message of the DBC by name or identifier. Raise CodecError."""
     messages = _messages()
     if key not in messages:
         names = ", ".join(entry.name for entry in database().messages)
@@ -73,7 +73,7 @@ def _messages() -> dict[str | int, Message]:
 
 @cache
 def data_ids(key: str | int) -> bytes:
-    """The DataIDList of a message: one byte for each counter 0..15."""
+    """Return the DataIDList of a message: one byte for each counter 0..15."""
     dbc = message(key).dbc
     assert dbc is not None
     base = int(dbc.attributes["E2EDataIdBase"].value)
@@ -81,13 +81,14 @@ def data_ids(key: str | int) -> bytes:
 
 
 def check(identifier: int, data: bytes | bytearray) -> bool:
-    """Whether length and CRC of a received frame are right."""
+    """Return whether length and CRC of a received frame are right."""
     return len(data) == message(identifier).length and e2e_p02_check(data, data_ids(identifier))
 
 
 @cache
 def _crc_table() -> NDArray[np.uint8]:
-    """The CRC register after a byte, by register xor byte; the library starts with 0xFF and inverts at the end."""
+    """Return the CRC register after a byte, by register xor byte; the library starts with 0xFF and inverts at the
+    end."""
     import numpy as np
 
     return np.array([calculate_crc8_h2f(bytes([index ^ 0xFF])) ^ 0xFF for index in range(256)], dtype=np.uint8)
@@ -100,7 +101,7 @@ def check_columns(name: str, data: NDArray[np.uint8]) -> NDArray[np.bool_]:
 
 
 def _crc_columns(name: str, data: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The CRC that each frame should have."""
+    """Return the CRC that each frame should have."""
     import numpy as np
 
     table, identifiers = _crc_table(), np.frombuffer(data_ids(name), dtype=np.uint8)
@@ -115,7 +116,7 @@ def _crc_columns(name: str, data: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 Quantiser = Callable[[Value], int]
-"""From a value to the bits of its field in the 64-bit little-endian word of a frame. Raises CodecError."""
+"""From a value to the bits of its field in the 64-bit little-endian word of a frame. Raise CodecError."""
 
 
 def _quantiser(owner: Message, signal: Signal) -> Quantiser:
@@ -129,7 +130,7 @@ def _quantiser(owner: Message, signal: Signal) -> Quantiser:
 
 
 def not_available(signal: Signal) -> int | None:
-    """The raw code of a field that says that there is no value; None where it has no such code."""
+    """Return the raw code of a field that says that there is no value; None where it has no such code."""
     return next((raw for raw, name in (signal.choices or {}).items() if str(name) == _NOT_AVAILABLE), None)
 
 
@@ -209,14 +210,15 @@ def _layout(name: str) -> _Layout:
 
 
 def _protected(word: int, identifiers: bytes) -> bytes:
-    """The frame of a 64-bit word that has its counter but no CRC yet."""
+    """Return the frame of a 64-bit word that has its counter but no CRC yet."""
     frame = bytearray(word.to_bytes(8, "little"))
     e2e_p02_protect(frame, identifiers, increment_counter=False)
     return bytes(frame)
 
 
 def encoder(name: str) -> Callable[..., bytes]:
-    """A fast encoder of a message without multiplexing: counter, then each value in the order of the DBC, to 8 bytes.
+    """Return a fast encoder of a message without multiplexing: counter, then each value in the order of the DBC, to 8
+    bytes.
 
     encoder("LEVER_SAMPLE") takes (counter, theta, theta_dot, tau_m), encoder("BASE_SAMPLE") (counter, z_ddot, time_us).
     """
@@ -237,7 +239,8 @@ def encoder(name: str) -> Callable[..., bytes]:
 
 
 def encode_columns(name: str, counters: NDArray[np.int64], values: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:
-    """encoder() of N frames at once, as (N, 8) bytes: every content of a message without multiplexing, by name."""
+    """Encode N frames at once, as encoder() does, into (N, 8) bytes: all fields of a message without multiplexing,
+    by name."""
     import numpy as np
 
     definition, layout = message(name), _layout(name)
@@ -260,7 +263,7 @@ def encode_columns(name: str, counters: NDArray[np.int64], values: Mapping[str, 
 
 
 def _present(layout: _Layout, values: Mapping[str, Value]) -> list[str]:
-    """The contents that a frame with these values holds: those of another multiplexer value are absent."""
+    """Return the contents that a frame with these values holds: those of another multiplexer value are absent."""
     selected = {
         key: layout.quantisers[key](values[key]) >> signal.start
         for key, signal in layout.contents.items()
@@ -274,7 +277,7 @@ def _present(layout: _Layout, values: Mapping[str, Value]) -> list[str]:
 
 
 def encode(name: str, counter: int, values: Mapping[str, Value]) -> bytes:
-    """The frame of a message with all its values by name, protected with `counter` (modulo 16).
+    """Return the frame of a message with all its values by name, protected with `counter` (modulo 16).
 
     A choice may be given by name ("freeze") or number. With `theta_valid: False` theta is not valid, whatever it is.
     Raises CodecError for a name that is missing or unknown, and for a value that the field cannot hold.
@@ -293,8 +296,8 @@ def encode(name: str, counter: int, values: Mapping[str, Value]) -> bytes:
 
 
 def decode(identifier: int, data: bytes | bytearray) -> tuple[str, dict[str, float]]:
-    """Name and fields of a received frame, choices as numbers, NaN for what is not available. Raises CodecError if it
-    is not in the DBC or corrupt."""
+    """Return name and fields of a received frame, choices as numbers, NaN for what is not available. Raises
+    CodecError if it is not in the DBC or corrupt."""
     definition = message(identifier)
     if not check(identifier, data):
         raise CodecError(f"{definition.name} ({identifier:#x}) {data.hex(' ')} is corrupt: its length or CRC is wrong")
@@ -317,14 +320,14 @@ def _absent(name: str) -> dict[str, float]:
 
 
 def raw_field(name: str, field: str) -> Callable[[bytes | bytearray], int]:
-    """A fast reader of the unscaled, unsigned bits of one field of an 8-byte frame."""
+    """Return a fast reader of the unscaled, unsigned bits of one field of an 8-byte frame."""
     signal = message(name).get_signal_by_name(field)
     start, mask = signal.start, (1 << signal.length) - 1
     return lambda data: int.from_bytes(data, "little") >> start & mask
 
 
 def decode_columns(name: str, data: NDArray[np.uint8]) -> dict[str, NDArray[np.float64]]:
-    """Every field of N frames of one message, data as (N, 8) bytes; CRCs are not checked.
+    """Return every field of N frames of one message, data as (N, 8) bytes; CRCs are not checked.
 
     Equal to cantools to the last bit. Where a multiplexed field is absent, or a value not available, there is NaN.
     """

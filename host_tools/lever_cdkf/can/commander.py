@@ -43,7 +43,7 @@ class Commander:
         self._lock = threading.Lock()
 
     def send(self, values: Mapping[str, codec.Value], put: Callable[[int, bytes], None]) -> int:
-        """Has `put` send a COMMAND that changes only `values`; returns its counter, 0 to 15. Raises CodecError."""
+        """Have `put` send a COMMAND that changes only `values`; return its counter, 0 to 15. Raise CodecError."""
         with self._lock:
             counter = self._counter
             data = codec.encode("COMMAND", counter, {"request": "none", **KEEP, **values})
@@ -53,12 +53,12 @@ class Commander:
 
 
 def result_of(ack: Mapping[str, float]) -> str:
-    """ACCEPTED, SEQUENCE or another of the results in lever.dbc, of the fields of a COMMAND_ACK."""
+    """Return ACCEPTED, SEQUENCE or another result of lever.dbc, from the fields of a COMMAND_ACK."""
     number = int(ack["result"])
     choices = codec.message("COMMAND_ACK").get_signal_by_name("result").choices
     return str(choices[number]) if choices and number in choices else f"result {number}"
 
 
 def refusal(result: str) -> str:
-    """Why a COMMAND was refused, in words."""
+    """Return why a COMMAND was refused, in words."""
     return f"the estimator refuses COMMAND: {_REFUSALS.get(result, result)}"

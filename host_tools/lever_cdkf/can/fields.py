@@ -24,7 +24,7 @@ _ESTIMATES = ("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMI
 
 
 def columns(name: str, data: NDArray[np.uint8]) -> dict[str, NDArray[np.float64]]:
-    """Every field of N frames of one message, data as (N, 8) bytes; CRCs are not checked."""
+    """Return every field of N frames of one message, data as (N, 8) bytes; CRCs are not checked."""
     fields = codec.decode_columns(name, data)
     if name in _ESTIMATES:
         unusable = fields["valid"] == 0.0
@@ -41,6 +41,7 @@ def columns(name: str, data: NDArray[np.uint8]) -> dict[str, NDArray[np.float64]
 
 
 def belongs(fields: dict[str, NDArray[np.float64]], time_us: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Whether each frame of columns() is of the sample with this time [us], by the low bits of it that it carries."""
+    """Return whether each frame of columns() is of the sample with this time [us], by the low bits of it that it
+    carries."""
     right: NDArray[np.bool_] = fields["time_low"] == (time_us & 0xFFFF)
     return right

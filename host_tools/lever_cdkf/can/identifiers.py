@@ -59,7 +59,7 @@ def add_identifier_options(parser: argparse.ArgumentParser, *aliases: str) -> No
 
 
 def use(args: argparse.Namespace) -> None:
-    """Makes the choice of a command line the one of this process."""
+    """Make the choice of a command line the one of this process."""
     global _chosen
     offset, base = getattr(args, "id_offset", None), getattr(args, "id_base", None)
     _chosen = Identifiers(offset or 0) if base is None else Identifiers(base, extended=True)
@@ -70,7 +70,7 @@ def chosen() -> Identifiers:
 
 
 def to_bus(identifier: int) -> tuple[int, bool]:
-    """The identifier of a message on the bus, and whether it has 29 bits."""
+    """Return the identifier of a message on the bus, and whether it has 29 bits."""
     return identifier + _chosen.shift, _chosen.extended
 
 
@@ -80,7 +80,7 @@ def word(identifier: int) -> int:
 
 
 def from_bus(identifier: int, extended: bool) -> tuple[int, bool]:
-    """The other way."""
+    """Return the other way."""
     ours = identifier - _chosen.shift
     if _chosen.are_those_of_the_dbc or (extended == _chosen.extended and 0 <= ours <= _MOST):
         return ours, extended and _chosen.are_those_of_the_dbc
@@ -88,7 +88,7 @@ def from_bus(identifier: int, extended: bool) -> tuple[int, bool]:
 
 
 def translate(frames: Frames) -> Frames:
-    """Frames of a log, in place."""
+    """Return frames of a log, in place."""
     import numpy as np
 
     from .bulk import EXTENDED
@@ -103,7 +103,7 @@ def translate(frames: Frames) -> Frames:
 
 
 def translate_bus(bus: can.BusABC) -> can.BusABC:
-    """A bus that takes and gives the identifiers of lever.dbc, where it has others; it stays of its class."""
+    """Return a bus that takes and gives the identifiers of lever.dbc, where it has others; it stays of its class."""
     if _chosen.are_those_of_the_dbc:
         return bus
     receive, send = bus.recv, bus.send
@@ -126,7 +126,7 @@ def translate_bus(bus: can.BusABC) -> can.BusABC:
 
 
 def shifted_dbc(text: str) -> str:
-    """The text of a DBC with its identifiers as they are on the bus."""
+    """Return the text of a DBC with its identifiers as they are on the bus."""
     return re.sub(
         r"^((?:CM_ |BA_ \"\w+\" )?(?:BO_|SG_|VAL_|SG_MUL_VAL_|BO_TX_BU_) )(\d+)\b",
         lambda found: f"{found[1]}{word(int(found[2]))}",

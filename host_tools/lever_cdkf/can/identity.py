@@ -20,7 +20,7 @@ class Identity:
         self._values: dict[str, float] = {}
 
     def take(self, fields: Mapping[str, float]) -> None:
-        """The fields of a frame, as codec.decode() has them."""
+        """Take the fields of a frame, as codec.decode() returns them."""
         self._values |= {name: value for name, value in fields.items() if not math.isnan(value)}
 
     @property
@@ -55,7 +55,7 @@ class Identity:
         return self._values.get("dither_rms")
 
     def check(self, who: str) -> None:
-        """Raises LeverError when it speaks another contract than this program."""
+        """Raise LeverError when it speaks another contract than this program."""
         if self.contract not in (None, codec.contract()):
             raise LeverError(
                 f"{who} speaks contract {self.contract} of lever.dbc, this program {codec.contract()}: use "

@@ -47,8 +47,8 @@ class Recording:
     """One or several logs."""
 
     def __init__(self, paths: Iterable[str | os.PathLike[str]], *, translated: bool = True) -> None:
-        """Opens the logs and reads the first frames of each. `translated`: with the identifiers of lever.dbc, whatever
-        they were on the bus. Raises LogError."""
+        """Open the logs and read the first frames of each. `translated`: with the identifiers of lever.dbc, whatever
+        they were on the bus. Raise LogError."""
         self._translated = translated
         self.buses = Buses()
         self.damaged = 0
@@ -73,12 +73,12 @@ class Recording:
         return sum(self._done.values())
 
     def chunks(self) -> Iterator[Frames]:
-        """All frames. Can be asked for once. Raises LogError."""
+        """Yield all frames. Can be asked for once. Raise LogError."""
         for chunks in self._chunks:
             yield from chunks
 
     def _open(self, path: str) -> tuple[int, str, Iterator[Frames]]:
-        """Time of the first frame [us], path, and all chunks."""
+        """Yield time of the first frame [us], path, and all chunks."""
         chunks = self._guarded(path, _reader(path)(self, path))
         first = next(chunks, None)
         if first is None:
@@ -96,7 +96,7 @@ class Recording:
         return f": {self.ends_early[-1].removeprefix(f'{path}: ')}" if self.ends_early else ""
 
     def _guarded(self, path: str, chunks: Iterator[Frames]) -> Iterator[Frames]:
-        """The chunks; what breaks off after the first of them is noted, not raised."""
+        """Yield the chunks; what breaks off after the first of them is noted, not raised."""
         while True:
             try:
                 frames = next(chunks, None)
@@ -174,7 +174,7 @@ class Recording:
         return frames
 
     def _bus(self, channel: Any) -> int | None:
-        """A bus by python-can's channel, which may be a number or missing; a name holds no blanks."""
+        """Return a bus by python-can's channel, which may be a number or missing; a name holds no blanks."""
         return self.buses.index("can" if channel is None else "_".join(str(channel).split()) or "can")
 
 
@@ -203,7 +203,7 @@ def _open_log(path: str) -> Any:
 
 
 def _why_short(path: str, reader: Any) -> list[str]:
-    """Why a BLF has less in it than was recorded, by its header; python-can reads it without a word."""
+    """Return why a BLF has less in it than was recorded, by its header; python-can reads it without a word."""
     length = getattr(reader, "file_size", None)
     if length is None or path.endswith(_COMPRESSED):
         return []
@@ -221,7 +221,7 @@ def _one_line(error: Exception) -> str:
 
 
 def _reader(path: str) -> Callable[[Recording, str], Iterator[Frames]]:
-    """How a file is read, by its name. Raises LogError, and LeverError where an extra is missing."""
+    """Return how a file is read, by its name. Raise LogError, and LeverError where an extra is missing."""
     suffix = Path(path.removesuffix(_COMPRESSED)).suffix.lower()
     if path == "-" or suffix in _CANDUMP or not _is_file(path):
         return Recording._candump
@@ -234,7 +234,8 @@ def _reader(path: str) -> Callable[[Recording, str], Iterator[Frames]]:
 
 
 def _is_file(path: str) -> bool:
-    """False for what is there but has no end known before, such as a pipe. Raises LogError for what is not there."""
+    """Return False for what is there but has no end known before, such as a pipe. Raise LogError for what is not
+    there."""
     try:
         mode = os.stat(path).st_mode
     except OSError as error:
@@ -249,7 +250,7 @@ def _size(path: str) -> int:
 
 
 def _blocks(text: Any) -> Iterator[bytes]:
-    """All of it; of a compressed file that is damaged all that comes before the damage, then its error."""
+    """Yield all of it; of a compressed file that is damaged all that comes before the damage, then its error."""
     if not isinstance(text, gzip.GzipFile):
         while block := text.read(BLOCK):
             yield block
@@ -272,7 +273,8 @@ def _blocks(text: Any) -> Iterator[bytes]:
 
 @contextmanager
 def _open_text(path: str) -> Iterator[tuple[Any, Callable[[], int]]]:
-    """The bytes of a text that may be compressed, and a function that tells how many bytes of the file are read."""
+    """Yield the file object of a text that may be compressed, and a function that returns how many bytes have been
+    read."""
     if path == "-":
         with open(sys.stdin.fileno(), "rb", buffering=0, closefd=False) as file:
             yield file, lambda: 0

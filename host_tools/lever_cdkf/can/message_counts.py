@@ -34,11 +34,11 @@ class Traffic:
         self.clear()
 
     def clear(self) -> None:
-        """Counts start again from 0."""
+        """Count start again from 0."""
         self.frames = self.lost = self.corrupt = self.repeated = 0
 
     def take(self, frames: Iterable[bytes | bytearray], now: float) -> list[bytes | bytearray]:
-        """Counts frames that have come; returns the good ones, without what was corrupt."""
+        """Count frames that have come; return the good ones, without what was corrupt."""
         good = []
         for data in frames:
             self.frames += 1

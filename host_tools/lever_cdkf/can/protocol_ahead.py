@@ -19,7 +19,7 @@ _CHUNK = 4096
 
 
 def read_ahead(channel: str) -> str:
-    """The channel to give to python-can's slcan instead of `channel`."""
+    """Return the channel to give to python-can's slcan instead of `channel`."""
     package = __name__.rpartition(".")[0]
     if os.name != "posix":
         return channel
@@ -55,7 +55,7 @@ class _ReadAhead:
         return taken
 
     def reset_input_buffer(self) -> None:
-        """Forgets what has come."""
+        """Forget what has come."""
         self._ahead = b""
         super().reset_input_buffer()  # type: ignore[misc]
 

@@ -68,7 +68,7 @@ class Recorder:
         return time.monotonic() - self._start
 
     def run(self, ended: Callable[[], bool], tell: Callable[[Recorder], None]) -> None:
-        """Records until `ended` is true, asked ten times a second; `tell` is called each second. Raises LeverError."""
+        """Record until `ended` is true, asked ten times a second; `tell` is called each second. Raise LeverError."""
         for path in (self._path, self.partial):
             if path.exists():
                 raise LeverError(f"{path} exists already: choose another name, or move it away")
@@ -84,7 +84,7 @@ class Recorder:
             raise LeverError(f"the bus failed: {error}; {self._kept()}") from None
 
     def _make_room(self) -> None:
-        """Lets frames wait while this process has no turn: a socket holds but a tenth of a second otherwise."""
+        """Let frames wait while this process has no turn: a socket holds but a tenth of a second otherwise."""
         opened = getattr(self._bus, "socket", None)
         if isinstance(opened, socket.socket):
             for option in (_SO_RCVBUFFORCE, socket.SO_RCVBUF):  # the first takes a privilege
@@ -137,7 +137,8 @@ class Recorder:
                 self._enter(self._bus.state.name.lower())
 
     def _take_error(self, message: can.Message) -> None:
-        """An error frame of SocketCAN: its identifier is a mask of classes, byte 1 of the controller's conditions."""
+        """Count an error frame of SocketCAN: its identifier is a mask of classes, byte 1 the state of the
+        controller."""
         conditions = message.data[1] if message.arbitration_id & _CONTROLLER and len(message.data) > 1 else 0
         self.overflows += bool(conditions & _RX_OVERFLOW)
         if message.arbitration_id & _BUS_OFF:

@@ -34,7 +34,7 @@ class Snapshot(NamedTuple):
 
 
 def find(frames: Frames) -> list[Snapshot]:
-    """The snapshots that begin among frames of one bus; frames that came twice count once."""
+    """Return the snapshots that begin among frames of one bus; frames that came twice count once."""
     places = np.flatnonzero(frames["id"] == codec.message(NAME).frame_id)
     data = np.ascontiguousarray(frames["data"][places])
     again = np.zeros(len(places), np.bool_)

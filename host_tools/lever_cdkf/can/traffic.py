@@ -30,7 +30,7 @@ _WORDS = {
 
 
 def why_refused(corrupt: int, late: int) -> str:
-    """Why an estimator has refused frames, by its counts of them; empty when it has refused none."""
+    """Return why an estimator has refused frames, by its counts of them; empty when it has refused none."""
     reasons = [f"{corrupt:,} corrupt (CRC, length or value)"] if corrupt else []
     if late:
         reasons.append(f"{late:,} repeated or out of sequence (does the sender count each message from 0 to 15?)")
@@ -68,7 +68,8 @@ class Traffic:
         self._bus: int | None = None
 
     def chunks(self) -> Iterator[Frames]:
-        """The estimator's frames, inputs and recorded answers, in recorded order. Raises LogError without a sample."""
+        """Yield the estimator's frames, inputs and recorded answers, in recorded order. Raise LogError without a
+        sample."""
         waiting: list[Frames] = []
         for frames in self._part():
             if self._bus is None:
@@ -86,11 +87,11 @@ class Traffic:
             raise LogError(self._why_no_samples())
 
     def described(self) -> list[str]:
-        """What was left out, in words, an entry for each kind that occurred."""
+        """Return what was left out, in words, an entry for each kind that occurred."""
         return [f"{count:,} {_WORDS[kind]}" for kind, count in self.others.items() if count]
 
     def _part(self) -> Iterator[Frames]:
-        """The frames of the part, counted, and commands before it."""
+        """Yield the frames of the part, counted, and commands before it."""
         beginning: int | None = None
         for frames in self.recording.chunks():
             beginning = int(frames["time_us"][0]) if beginning is None else beginning
@@ -141,7 +142,7 @@ class Traffic:
         return kept
 
     def _right(self, frames: Frames) -> NDArray[np.bool_]:
-        """False for recorded answers that are corrupt; inputs are the estimator's to judge."""
+        """Return False for recorded answers that are corrupt; inputs are the estimator's to judge."""
         right = np.ones(len(frames), np.bool_)
         for identifier, name in self._answers.items():
             where = np.flatnonzero(frames["id"] == identifier)
@@ -151,7 +152,7 @@ class Traffic:
         return right
 
     def _count_others(self, frames: Frames, ours: NDArray[np.bool_]) -> None:
-        """Counts each frame that is not ours under the first kind that fits."""
+        """Count each frame that is not ours under the first kind that fits."""
         left, flags = ~ours, frames["flags"]
         kinds = {
             "error": flags & ERROR != 0,
@@ -180,11 +181,11 @@ class Traffic:
 
 
 def sample_chunks(traffic: Traffic) -> Iterator[dict[str, NDArray[np.float64]]]:
-    """The samples, as run_samples() takes them, a chunk at a time: time_us (continued beyond 32 bits), theta [rad],
-    theta_dot [rad/s], tau_m [N m], z_ddot [m/s^2], grip_force [N]; NaN where a value is invalid or its LEVER_SAMPLE or
-    GRIP_SAMPLE is missing.
+    """Yield the samples, as run_samples() takes them, a chunk at a time: time_us (continued beyond 32 bits), theta
+    [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s^2], grip_force [N]; NaN where a value is invalid or its
+    LEVER_SAMPLE or GRIP_SAMPLE is missing.
 
-    Corrupt frames are left out, and samples with the time of the one before. Raises LogError.
+    Corrupt frames are left out, and samples with the time of the one before. Raise LogError.
     """
     pairing = _Pairing()
     for frames in traffic.chunks():
@@ -232,7 +233,7 @@ class _Pairing:
 
     @staticmethod
     def _before(both: Frames, base: NDArray[np.intp], identifier: int) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        """The last frame with that identifier before each BASE_SAMPLE, and whether it belongs to it."""
+        """Return the last frame with that identifier before each BASE_SAMPLE, and whether it belongs to it."""
         there = np.flatnonzero(both["id"] == identifier)
         if not len(there):
             return np.zeros_like(base), np.zeros(len(base), np.bool_)
@@ -253,6 +254,6 @@ class _Pairing:
 
 
 def read_samples(traffic: Traffic) -> dict[str, NDArray[np.float64]]:
-    """All of sample_chunks() together."""
+    """Return all of sample_chunks() together."""
     chunks = list(sample_chunks(traffic))
     return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}

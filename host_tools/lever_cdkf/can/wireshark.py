@@ -27,7 +27,7 @@ _SIZES = (8, 16, 32, 64)
 
 
 def write_profile(folder: Path) -> None:
-    """Writes the profile into a folder, such as ~/.config/wireshark/profiles/lever. Raises LeverError."""
+    """Write the profile into a folder, such as ~/.config/wireshark/profiles/lever. Raises LeverError."""
     messages = database().messages
     tables: dict[str, Iterable[Row]] = {
         "Signal_PDU_identifiers": ((_hex(message.frame_id), message.name) for message in messages),
@@ -48,7 +48,7 @@ def _hex(number: int) -> str:
 
 
 def _fields(message: Message) -> list[Signal | int]:
-    """The signals of a message from its first bit on; a number is so many bits of nothing."""
+    """Return the signals of a message from its first bit on; a number is so many bits of nothing."""
     fields: list[Signal | int] = []
     end = 0
     for signal in sorted(message.signals, key=lambda signal: signal.start):
@@ -87,7 +87,7 @@ def _values(message: Message) -> Iterator[Row]:
 
 
 def _named(field: Signal) -> Iterator[tuple[int, int, str]]:
-    """First and last bits, as they are in the frame, that have a name."""
+    """Yield first and last bits, as they are in the frame, that have a name."""
     size = 1 << field.length
     for raw, name in sorted((field.choices or {}).items()):
         yield raw % size, raw % size, str(name)

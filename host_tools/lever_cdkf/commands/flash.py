@@ -76,7 +76,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def openocd(image: Path, kind: str | None, serial: str | None) -> list[str]:
-    """The arguments that write `image`; a .bin is given its address."""
+    """Return the arguments that write `image`; a .bin is given its address."""
     interface = kind or "stlink"
     commands = [*INTERFACES[interface], *([f"adapter serial {serial}"] if serial else [])]
     where = " 0x08000000" if image.suffix == ".bin" else ""
@@ -88,7 +88,7 @@ def openocd(image: Path, kind: str | None, serial: str | None) -> list[str]:
 
 
 def pyocd(image: Path, kind: str | None, serial: str | None) -> list[str]:
-    """The arguments that write `image`; a .bin goes to the start of flash by itself. It verifies by default."""
+    """Return the arguments that write `image`; a .bin goes to the start of flash by itself. It verifies by default."""
     probe = [*([kind.replace("-", "")] if kind else []), *([serial] if serial else [])]
     return [
         *("load", "--no-wait", "--target", TARGET),
@@ -123,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _find(tool: str) -> str:
-    """The path of a program, in PATH or beside this Python; "" when it is in neither."""
+    """Return the path of a program, in PATH or beside this Python; "" when it is in neither."""
     return shutil.which(tool) or shutil.which(tool, path=str(Path(sys.executable).parent)) or ""
 
 
@@ -160,7 +160,7 @@ def _run(command: list[str]) -> tuple[int, str]:
 
 
 def _advice(tool: str, output: str) -> str:
-    """What to do about a failure, by what the tool has said (in lower case)."""
+    """Return what to do about a failure, by what the tool has said (in lower case)."""
     if any(phrase in output for phrase in NO_PERMISSION):
         return (
             f"{tool} may not open the probe: install its udev rules (Debian's openocd has them), and plug it in again"

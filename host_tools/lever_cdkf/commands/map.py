@@ -135,7 +135,7 @@ def _row(key: str, signal: Signal) -> Row:
 
 
 def _signal_options(args: argparse.Namespace, mapping: Mapping, proposed: list[Candidate]) -> str:
-    """The log and the proposal, as arguments of commands that read signals."""
+    """Return the log and the proposal, as arguments of commands that read signals."""
     database = f" --dbc {shlex.quote(args.dbc)}" if args.dbc else ""
     entries = []
     for each in proposed:

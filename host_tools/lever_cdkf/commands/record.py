@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _reading(args: argparse.Namespace) -> tuple[Reading | None, bool]:
-    """How the log will be read by others, checked before it is recorded, and whether that is CAN FD. Raises
+    """Return how the log will be read by others, checked before it is recorded, and whether that is CAN FD. Raises
     LeverError."""
     if not (args.map or args.dbc or args.clock):
         return None, False
@@ -100,7 +100,7 @@ def _reading(args: argparse.Namespace) -> tuple[Reading | None, bool]:
 
 
 def _mapped(log: Path, reading: Reading | None) -> Tables:
-    """What has come of the mapped signals. A log without them is complete, too."""
+    """Return what has come of the mapped signals. A log without them is complete, too."""
     if reading is None:
         return {}
     from ..signals.reading import read
@@ -125,7 +125,7 @@ def _seconds(text: str) -> float:
 
 @contextmanager
 def _stopping() -> Iterator[list[int]]:
-    """A list that holds the signal, once Ctrl-C or SIGTERM has come."""
+    """Yield a list that holds the signal once Ctrl-C or SIGTERM has come."""
     came: list[int] = []
     before = {
         number: signal.signal(number, lambda got, _: came.append(got)) for number in (signal.SIGINT, signal.SIGTERM)

@@ -160,7 +160,7 @@ def _options(args: argparse.Namespace, log: str, formats: Sequence[str]) -> Opti
 
 
 def _tune_command(args: argparse.Namespace, log: str) -> str:
-    """How `lever tune` reads the same."""
+    """Return how `lever tune` reads the same."""
     options = {"--dbc": args.dbc, "--clock": args.clock, "--channel": args.channel, "--settings": args.settings}
     words = ["lever", "tune", *([log] if args.each else args.logs)]
     words += [word for option, value in options.items() if value is not None for word in (option, value)]

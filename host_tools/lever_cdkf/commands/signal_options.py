@@ -59,7 +59,7 @@ def add_part_options(parser: argparse.ArgumentParser, length: float | None = Non
 
 
 def check_part(args: argparse.Namespace) -> tuple[float, float]:
-    """Start and length. Raises LeverError."""
+    """Start and length. Raise LeverError."""
     length = float("inf") if args.length is None else args.length
     if not args.start >= 0.0 or not length > 0.0:
         raise LeverError(f"--start {args.start:g} --length {length:g}: seconds, and length must be more than 0")
@@ -67,7 +67,7 @@ def check_part(args: argparse.Namespace) -> tuple[float, float]:
 
 
 def input_files(args: argparse.Namespace) -> list[str]:
-    """The files that the options name: settings, database, mappings, aircraft."""
+    """Return the files that the options name: settings, database, mappings, aircraft."""
     aircraft = getattr(args, "aircraft", None) or ""
     of_aircraft = [each for each in (aircraft, aircraft.partition(",")[0]) if each and Path(each).is_file()]
     named = [getattr(args, "settings", None), args.dbc, *of_aircraft]
@@ -75,8 +75,8 @@ def input_files(args: argparse.Namespace) -> list[str]:
 
 
 def chosen_aircraft(text: str) -> AircraftResponse:
-    """The response in a file, or of NAME[,KEY=VALUE…] by the package that knows aircraft, where NAME may also be a file
-    that it reads. Raises LeverError."""
+    """Return the response in a file, or of NAME[,KEY=VALUE…] by the package that knows aircraft, where NAME may also
+    be a file that it reads. Raise LeverError."""
     from ..firmware.aircraft import read_response
 
     if Path(text).is_file() and not text.lower().endswith(_OF_PACKAGE):
@@ -95,7 +95,7 @@ def chosen_aircraft(text: str) -> AircraftResponse:
 
 
 def chosen_reading(args: argparse.Namespace, log: str) -> Reading | None:
-    """How `log` is to be read; None for a log of lever.dbc. Raises LeverError."""
+    """Return how `log` is to be read; None for a log of lever.dbc. Raise LeverError."""
     start, length = check_part(args)
     if not (args.map or args.dbc):
         from ..signals.tables import is_table

@@ -128,7 +128,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _settings(args: argparse.Namespace) -> Assignments:
-    """What to start from. Raises LeverError for that and for every other argument that is wrong."""
+    """Return what to start from. Raise LeverError for that and for every other argument that is wrong."""
     from ..firmware.config import setting
     from ..firmware.settings_file import make_config, parse_assignment, read_assignments
 
@@ -188,7 +188,7 @@ def _conclude(
     tuned: Sequence[Tuned],
     fits: Sequence[Fit],
 ) -> int:
-    """Prints and writes everything; the exit status."""
+    """Print and write everything; return the exit status."""
     from ..files import write_text
     from ..provenance import provenance, with_provenance
     from ..tables import print_tables
@@ -226,7 +226,7 @@ def _conclude(
 
 
 def _refuse(args: argparse.Namespace, likelihood: Likelihood, calibration: Calibration) -> int:
-    """Says what was found, why it is not believed, and what to try; the exit status."""
+    """Say what was found, why it is not believed, and what to try; the exit status."""
     from ..tables import print_tables
     from ..tune.likelihood import SHORTEST
     from ..tune.search import NOISE
@@ -269,18 +269,18 @@ def _delay_to_mapping(
 
 
 def _say_next(command: str) -> None:
-    """Prints a command, to be copied."""
+    """Print a command, to be copied."""
     print("Next:", *command_lines(command, terminal_width()), sep="\n")
 
 
 def _replay(args: argparse.Namespace, mapping: Path | None) -> str:
-    """The command that flies the log with what was found."""
+    """Return the command that flies the log with what was found."""
     words = ["lever", "replay", *_log_words(args, args.map if mapping is None else [str(mapping)])]
     return shlex.join([*words, "--settings", str(args.output)])
 
 
 def _tune(args: argparse.Namespace, start: int, length: int) -> str:
-    """The same command, of another part of the log."""
+    """Return the same command, of another part of the log."""
     given = {"--settings": args.settings, "-o": args.output, "--page": args.page}
     words = ["lever", "tune", *_log_words(args, args.map), "--start", str(start), "--length", str(length)]
     words += [word for option, value in given.items() if value is not None for word in (option, str(value))]
@@ -290,7 +290,7 @@ def _tune(args: argparse.Namespace, start: int, length: int) -> str:
 
 
 def _log_words(args: argparse.Namespace, mapping: Sequence[str]) -> list[str]:
-    """The log and how it is read, as arguments."""
+    """Return the log and how it is read, as arguments."""
     given = {
         "--dbc": args.dbc,
         "--channel": args.channel,
@@ -345,7 +345,7 @@ def _calibration_row(entry: Calibrated) -> Row:
 
 
 def _fit_rows(fits: Sequence[Fit]) -> list[Row]:
-    """A row for each part of the log and way to have the noise."""
+    """Return a row for each part of the log and way to have the noise."""
     from ..tune import validation
 
     rows: list[Row] = []
@@ -367,7 +367,7 @@ def _fit_rows(fits: Sequence[Fit]) -> list[Row]:
 
 
 def _file(text: str, before: Assignments, after: Assignments) -> str:
-    """The settings file: what it was made of, and all that is not left to the firmware's defaults."""
+    """Return the settings file: what it was made of, and all that is not left to the firmware's defaults."""
     from ..firmware.settings_file import format_assignments, make_config
 
     was = make_config(before).settings

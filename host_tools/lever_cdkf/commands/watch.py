@@ -139,7 +139,7 @@ def run_live(args: argparse.Namespace) -> int:
 
 
 def _source(args: argparse.Namespace) -> tuple[Source, Config]:
-    """What is to be watched, and the configuration of the estimator as far as it is known here."""
+    """Return what is to be watched, and the configuration of the estimator as far as it is known here."""
     from ..firmware.config import Config
 
     given = [name for name in ("log", "scenario", "interface") if getattr(args, name) is not None]

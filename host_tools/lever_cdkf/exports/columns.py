@@ -64,14 +64,14 @@ class Column:
 
 
 def columns(names: Iterable[str], model: str) -> list[Column]:
-    """Those of a trace with an estimator of that model, in the order of the trace without its time."""
+    """Return those of a trace with an estimator of that model, in the order of the trace without its time."""
     known = {column.source: column for column in _known(model)}
     unknown = {name: Column(name, name, name, "", "", "", MEASUREMENT) for name in names if name != "time_s"}
     return [known.get(name, column) for name, column in unknown.items()]
 
 
 def words(column: str, number: int) -> str:
-    """What a number of one of the columns TEXT stands for: "run"; "excitation, torque"."""
+    """Return what a number of one of the columns TEXT stands for: "run"; "excitation, torque"."""
     if column == "faults":
         return ", ".join(fault_names(number))
     return enum_names("lever_bounce" if column == "bounce" else "lever_mode").get(number, "")
@@ -85,7 +85,7 @@ def as_words(column: str, values: FloatArray) -> list[str | None]:
 
 
 def together(described: Iterable[Column], key: Callable[[Column], str]) -> dict[str, list[Column]]:
-    """Columns with the same key."""
+    """Return columns with the same key."""
     groups: dict[str, list[Column]] = {}
     for column in described:
         groups.setdefault(key(column), []).append(column)

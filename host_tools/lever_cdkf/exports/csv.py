@@ -28,11 +28,11 @@ class Csv:
             write_csv_rows(trace, self._file)
 
     def close(self) -> None:
-        """Completes the file."""
+        """Complete the file."""
         with writing(self._path):
             self._file.close()
 
     def abandon(self) -> None:
-        """Lets go of the file."""
+        """Let go of the file."""
         with suppress(OSError):
             self._file.close()

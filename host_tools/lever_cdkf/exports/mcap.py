@@ -43,7 +43,7 @@ class Mcap:
         self._channels: dict[str, int] = {}
 
     def _channel(self, name: str) -> int:
-        """Its number; a channel is there from its first message on."""
+        """Return its number; a channel is there from its first message on."""
         if name not in self._channels:
             content = json.dumps(_schema(name, self._topics[name]), ensure_ascii=False).encode()
             schema = self._writer.register_schema(f"lever/{name}", "jsonschema", content)
@@ -64,13 +64,13 @@ class Mcap:
                 self._writer.add_message(self._channel(name), at, text, at)
 
     def close(self) -> None:
-        """Writes the index."""
+        """Write the index."""
         with writing(self._path):
             self._writer.finish()
             self._file.close()
 
     def abandon(self) -> None:
-        """Lets go of the file."""
+        """Let go of the file."""
         with suppress(OSError):
             self._file.close()
 
@@ -100,7 +100,7 @@ def _topic(column: Column) -> str:
 
 
 def _schema(name: str, described: list[Column]) -> dict[str, Any]:
-    """A JSON schema."""
+    """Return a JSON schema."""
     properties = {}
     for column in described:
         unit = f" [{column.unit}]" if column.unit else ""

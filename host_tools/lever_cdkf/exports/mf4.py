@@ -82,7 +82,7 @@ class Mf4:
         return numbers
 
     def close(self) -> None:
-        """Writes the file."""
+        """Write the file."""
         for name, index in self._indices.items():
             channels = self._file.groups[index].channels[1:]  # the first is time
             for channel, column in zip(channels, self._groups[name], strict=True):
@@ -94,7 +94,7 @@ class Mf4:
             self._file.close()
 
     def abandon(self) -> None:
-        """Lets go of its files."""
+        """Let go of its files."""
         with suppress(Exception):
             self._file.close()
 
@@ -117,7 +117,7 @@ def _source(column: Column) -> Any:
 
 
 def _conversion(column: str, numbers: set[int]) -> Any:
-    """The words of the numbers that there are."""
+    """Return the words of the numbers that there are."""
     from asammdf.blocks.conversion_utils import from_dict
 
     table: dict[str, Any] = {"default_addr": ""}

@@ -50,13 +50,13 @@ class Parquet:
             self._writer.write_table(pyarrow.table(arrays, schema=self._schema))
 
     def close(self) -> None:
-        """Writes the index."""
+        """Write the index."""
         with writing(self._path):
             self._writer.close()
             self._file.close()
 
     def abandon(self) -> None:
-        """Lets go of the file."""
+        """Let go of the file."""
         for part in (self._file, self._writer):
             with suppress(Exception):
                 part.close()

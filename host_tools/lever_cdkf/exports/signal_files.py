@@ -35,7 +35,7 @@ _WRITERS: dict[str, Callable[[Path, Head], _Writer]] = {"csv": Csv, "mf4": Mf4, 
 
 
 def calendar(time_us: int) -> datetime | None:
-    """A recorded time [us since 1970] as a date; None where it is a time since something else."""
+    """Return a recorded time [us since 1970] as a date; None where it is a time since something else."""
     return _EPOCH + timedelta(microseconds=time_us) if time_us >= _ABSOLUTE else None
 
 
@@ -49,7 +49,7 @@ class SignalFiles:
         self.started = False
 
     def start(self, names: Iterable[str], start_us: int, estimator: dict[str, Any]) -> None:
-        """Begins the files: columns of the trace, recorded time of time_s = 0, the estimator's choices and settings."""
+        """Begin the files: columns of the trace, recorded time of time_s = 0, the estimator's choices and settings."""
         self.started = True
         start = calendar(start_us)
         more = {"estimator": estimator} | ({"start": start.isoformat()} if start else {})
@@ -64,7 +64,7 @@ class SignalFiles:
             writer.add(trace, published, recorded)
 
     def close(self) -> None:
-        """Completes the files. Raises LeverError."""
+        """Complete the files. Raise LeverError."""
         while self._writers:
             self._writers[-1].close()
             self._writers.pop()

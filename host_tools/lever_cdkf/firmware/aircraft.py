@@ -103,7 +103,7 @@ class AircraftResponse:
         return round(float(self.pointer.alarm), 6)
 
     def text(self) -> str:
-        """The content of its file."""
+        """Return the content of its file."""
         at = self.pointer
         lines = [
             f"# {self.name}",
@@ -124,7 +124,7 @@ class AircraftResponse:
 
 
 def read_response(path: str) -> AircraftResponse:
-    """The response of an aircraft in a file. Raises LeverError."""
+    """Return the response of an aircraft in a file. Raise LeverError."""
     points: list[list[float]] = []
     modes: list[list[float]] = []
     numbers: dict[str, float] = {}

@@ -33,7 +33,7 @@ class Setting:
     meaning: str
 
     def check(self, value: float) -> None:
-        """Raises SettingsError unless `value`, in single precision, is a number in the range."""
+        """Raise SettingsError unless `value`, in single precision, is a number in the range."""
         is_number = isinstance(value, Real) and not isinstance(value, bool)
         if not is_number or not single(self.least) <= single(value) <= single(self.greatest):
             raise SettingsError(
@@ -44,14 +44,14 @@ class Setting:
 
 @lru_cache(maxsize=4096)
 def shortest(value: float) -> float:
-    """The number with the fewest digits that is `value` in single precision: 0.1 for 0.100000001."""
+    """Return the number with the fewest digits that is `value` in single precision: 0.1 for 0.100000001."""
     candidates = (float(f"{value:.{digits}g}") for digits in range(1, 10))
     return next(candidate for candidate in candidates if single(candidate) == value)
 
 
 @cache
 def settings_table() -> tuple[Setting, ...]:
-    """All settings with unit, default, range and meaning, in the firmware's order."""
+    """Return all settings with unit, default, range and meaning, in the firmware's order."""
     rows = (lib.lever_setting(index) for index in range(lib.lever_setting_count()))
     return tuple(
         Setting(
@@ -67,7 +67,7 @@ def settings_table() -> tuple[Setting, ...]:
 
 
 def setting(name: str) -> Setting:
-    """The row of a setting. Raises SettingsError, with the nearest name there is."""
+    """Return the row of a setting. Raise SettingsError, with the nearest name there is."""
     rows = {row.name: row for row in settings_table()}
     if name not in rows:
         raise SettingsError(f"unknown setting {name!r}; {did_you_mean(name, rows, '`lever settings` lists them all')}")
@@ -75,7 +75,7 @@ def setting(name: str) -> Setting:
 
 
 def choice_value(enum: str, what: str, name: str) -> int:
-    """The number of `name` in a façade enum. Raises SettingsError, with what is allowed for `what`."""
+    """Return the number of `name` in a façade enum. Raise SettingsError, with what is allowed for `what`."""
     for value, candidate in enum_names(enum).items():
         if candidate == name:
             return value
@@ -91,7 +91,8 @@ class Parameter(NamedTuple):
 
 @cache
 def model_parameters(model: str) -> tuple[Parameter, ...]:
-    """The parameters of a model, in the order of lever_estimate_t. Raises SettingsError for a model that is none."""
+    """Return the parameters of a model, in the order of lever_estimate_t. Raise SettingsError for a model that is
+    none."""
     number = choice_value("lever_model", "model", model)
     return tuple(
         Parameter(

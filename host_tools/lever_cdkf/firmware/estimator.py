@@ -93,18 +93,18 @@ class Health(NamedTuple):
 
 
 def fault_names(faults: int) -> tuple[str, ...]:
-    """The names of the bits in a fault mask."""
+    """Return the names of the bits in a fault mask."""
     return tuple(name for bit, name in enum_names("lever_fault").items() if faults & bit)
 
 
 def health_of(pointer: Any) -> Health:
-    """The content of a lever_health_t."""
+    """Return the content of a lever_health_t."""
     values = {name: getattr(pointer, name) for name in Health._fields}
     return Health(**values | {"mode": _MODES[values["mode"]], "faults": fault_names(values["faults"])})
 
 
 def make_command(request: str = "none", dither_rms: float | None = None, **choices: str | None) -> Any:
-    """A lever_command_t *; None keeps a choice (of CHOICES) or the dither as it is."""
+    """Return a lever_command_t *; None keeps a choice (of CHOICES) or the dither as it is."""
     command = ffi.new("lever_command_t *", {"dither_rms": lib.LEVER_KEEP if dither_rms is None else dither_rms})
     command.request = choice_value("lever_request", "request", request)
     for what in CHOICES:
@@ -144,7 +144,7 @@ class Estimator:
         z_ddot: float | None = None,
         grip_force: float | None = None,
     ) -> str:
-        """Takes a sample and returns the mode after it.
+        """Take a sample and return the mode after it.
 
         Time [µs] (wrapped to 32 bits here), lever angle [rad] and rate [rad/s], motor torque [N m], vertical
         acceleration of the base [m/s²], force of the hand on the lever [N]; None is missing or invalid.
@@ -167,7 +167,7 @@ class Estimator:
         mitigation: str | None = None,
         dither_rms: float | None = None,
     ) -> None:
-        """Carries out a request ("none", "run", "freeze", "reset") before the next sample; None keeps a choice.
+        """Carry out a request ("none", "run", "freeze", "reset") before the next sample; None keeps a choice.
 
         dither_rms [N m] is the identification torque; 0 fades it out, None keeps it as it is. Torque and
         correction fade out a second of sample time after the last command: repeat one. Raises LeverError.
@@ -182,7 +182,7 @@ class Estimator:
         lib.lever_idle(self.pointer, elapsed_us)
 
     def estimate(self) -> Estimate:
-        """The estimate after the last sample."""
+        """Return the estimate after the last sample."""
         lib.lever_estimate(self.pointer, self._estimate)
         values = {name: getattr(self._estimate, name) for name in Estimate._fields}
         for name in ("parameter", "parameter_sigma", "parameter_correlation"):
@@ -197,7 +197,7 @@ class Estimator:
         return Feedthrough(response, raw.gain_sigma, raw.phase_sigma, raw.correlation)
 
     def watch(self, aircraft: AircraftResponse | None) -> None:
-        """Watches the loop with this aircraft from now on; None: with none. Raises LeverError."""
+        """Watch the loop with this aircraft from now on; None: with none. Raise LeverError."""
         if not lib.lever_aircraft(self.pointer, ffi.NULL if aircraft is None else aircraft.pointer):
             raise LeverError(
                 "the firmware refused the response of the aircraft: frequencies must rise from above 0, sigmas lie "
@@ -206,13 +206,13 @@ class Estimator:
         self._aircraft = aircraft
 
     def stability(self) -> Stability:
-        """How near the loop is to collective bounce, as of the last publish_period."""
+        """Return how near the loop is to collective bounce, as of the last publish_period."""
         lib.lever_stability(self.pointer, self._stability)
         values = {name: getattr(self._stability, name) for name in Stability._fields}
         return Stability(**values | {"state": _BOUNCE[values["state"]]})
 
     def correction(self) -> Correction:
-        """What mitigation adds to the lever's angle, until the next sample."""
+        """Return what mitigation adds to the lever's angle, until the next sample."""
         lib.lever_correction(self.pointer, self._correction)
         return Correction(self._correction.angle, self._correction.weight)
 
@@ -222,18 +222,19 @@ class Estimator:
         return health_of(self._health)
 
     def state(self) -> bytes:
-        """All that its future depends on besides configuration, aircraft and what it is given; between two samples."""
+        """Return all that its future depends on besides configuration, aircraft and what it is given; between two
+        samples."""
         room = ffi.new("uint8_t[]", lib.LEVER_STATE_BYTES)
         lib.lever_state_save(self.pointer, room)
         return bytes(room)
 
     def restore(self, state: bytes) -> bool:
-        """Goes on from the state of an instance with the same settings; False, and unchanged, for one that is of
+        """Go on from the state of an instance with the same settings; False, and unchanged, for one that is of
         another kind."""
         return len(state) == lib.LEVER_STATE_BYTES and bool(lib.lever_state_restore(self.pointer, state))
 
     def on_frame(self, identifier: int, data: bytes | bytearray) -> int:
-        """Takes a classic CAN frame (11-bit identifier, at most 8 bytes); FRAME_SAMPLE if it completes a sample."""
+        """Take a classic CAN frame (11-bit identifier, at most 8 bytes); FRAME_SAMPLE if it completes a sample."""
         length = len(data)
         if length > 8:
             raise LeverError(f"frame {identifier:#x} has {length} bytes; a classic CAN frame has at most 8")
@@ -244,12 +245,12 @@ class Estimator:
         return lib.lever_on_frame(self.pointer, received)  # type: ignore[no-any-return]
 
     def step(self) -> int:
-        """Takes the sample that on_frame() has completed; returns the mode, a key of enum_names("lever_mode")."""
+        """Take the sample that on_frame() has completed; returns the mode, a key of enum_names("lever_mode")."""
         return lib.lever_step(self.pointer)  # type: ignore[no-any-return]
 
     def next_frame(self) -> tuple[int, bytes] | None:
-        """The next frame to send, as identifier and data; None when there is none left. Fetch them after every frame
-        taken: a COMMAND is acknowledged, sample or not."""
+        """Return the next frame to send, as identifier and data; None when there is none left. Fetch them after
+        every frame taken: a COMMAND is acknowledged, sample or not."""
         answer = self._answer
         if not lib.lever_next_frame(self.pointer, answer):
             return None
@@ -257,7 +258,7 @@ class Estimator:
 
 
 def state_layout() -> int:
-    """Of the bytes of state(): those of another version of the firmware have another one."""
+    """Return the state layout of the bytes of state(): those of another version of the firmware have another one."""
     return int(lib.lever_state_layout())
 
 
@@ -271,14 +272,15 @@ class Recorder:
         self._frame = ffi.new("lever_frame_t *")
 
     def frames(self) -> Iterator[tuple[int, bytes]]:
-        """Those to send now: after a step all of whose frames have been fetched, before the next frame is taken."""
+        """Yield those to send now: after a step all of whose frames have been fetched, before the next frame is
+        taken."""
         lib.lever_recorder_step(self.pointer, self._estimator.pointer)
         while lib.lever_recorder_next_frame(self.pointer, self._frame):
             yield self._frame.id, bytes(ffi.buffer(self._frame.data))
 
 
 def feed(estimator: Estimator, samples: NDArray[Any], at: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Has the estimator take samples (lever_sample_t), up to the last with an index in `at`, which rise. Returns
+    """Have the estimator take samples (lever_sample_t), up to the last with an index in `at`, which rise. Returns
     lever_estimate_t and lever_health_t after each of these."""
     import numpy as np
 
@@ -299,7 +301,7 @@ def feed(estimator: Estimator, samples: NDArray[Any], at: NDArray[np.int64]) -> 
 def run_samples(
     config: Config | None, samples: Mapping[str, Any], at: NDArray[np.int64] | None = None
 ) -> dict[str, NDArray[Any]]:
-    """Feeds N samples to a fresh estimator and returns what it says after each, or after those with the indices `at`.
+    """Feed N samples to a fresh estimator and return its estimates after each, or after those with the indices `at`.
 
     samples: columns of N numbers (arrays, lists, of pandas, of polars): time_us [µs] (whole numbers, wrapped here),
     theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s²], grip_force [N]; bool columns theta_valid … may say what

@@ -24,8 +24,9 @@ INNOVATION = struct_dtype("sample_innovation_t")
 
 
 def samples_of(frames: Array, config: Config | None = None) -> tuple[Array, dict[str, str], Health]:
-    """The samples (SAMPLE) that the firmware makes of received frames (FRAME), the choices (model, preload …) that
-    commands among them have made, and its counts of what was wrong; lost is what comes later than sample_period."""
+    """Return the samples (SAMPLE) that the firmware makes of received frames (FRAME), the choices (model, preload …)
+    that commands among them have made, and its counts of what was wrong; lost is what comes later than
+    sample_period."""
     samples = np.empty(len(frames), SAMPLE)
     config, health = config or Config(), ffi.new("lever_health_t *")
     with _one_at_a_time:
@@ -40,7 +41,7 @@ def samples_of(frames: Array, config: Config | None = None) -> tuple[Array, dict
 
 
 def innovations(config: Config, samples: Array) -> Array:
-    """What a fresh estimator makes of the samples (SAMPLE): INNOVATION for each. Raises LeverError."""
+    """Return what a fresh estimator makes of the samples (SAMPLE): INNOVATION for each. Raise LeverError."""
     result = np.empty(len(samples), INNOVATION)
     with _one_at_a_time:
         done = _lib.innovation_run(

@@ -22,7 +22,8 @@ ffi: Any = cffi.FFI()
 
 @cache
 def load(library: str) -> Any:
-    """The functions of a shared library; what installing has made of its header declares them. Raises LeverError."""
+    """Return the functions of a shared library; what installing has made of its header declares them. Raises
+    LeverError."""
     ffi.cdef(native_file(f"{library}_cdef.h").read_text(encoding="utf-8"))
     path = native_file(shared_library(library))
     try:
@@ -36,7 +37,7 @@ lib = load("lever_cdkf")
 
 @cache
 def enum_names(enum: str) -> dict[int, str]:
-    """Value to name of a façade enum, in lower case without prefix: enum_names("lever_mode") is {0: "init", …}.
+    """Return value to name of a façade enum, in lower case without prefix: enum_names("lever_mode") is {0: "init", …}.
 
     The prefix is the enum's name, or that without its last word (LEVER_PLATFORM_CLOCK of enum lever_platform_fault).
     """
@@ -48,7 +49,7 @@ def enum_names(enum: str) -> dict[int, str]:
 
 @cache
 def enum_words(enum: str) -> dict[str, str]:
-    """What the façade header says of each member of an enum, by its name of enum_names()."""
+    """Return what the façade header says of each member of an enum, by its name of enum_names()."""
     header = native_file("lever_cdkf_cdef.h").read_text(encoding="utf-8")
     body = header.partition(f"enum {enum} {{")[2].partition("}")[0]
     comments = re.findall(r"= (\d+),?\s*/\*(.*?)\*/", body, re.DOTALL)
@@ -57,7 +58,7 @@ def enum_words(enum: str) -> dict[str, str]:
 
 
 def struct_dtype(ctype: str) -> np.dtype[Any]:
-    """The numpy dtype of a struct, padding included."""
+    """Return the numpy dtype of a struct, padding included."""
     import numpy as np
 
     struct = ffi.typeof(ctype)

@@ -52,7 +52,7 @@ class Quantity:
         return self.unit.replace("^2", "²")
 
     def column(self, kind: str) -> str:
-        """Its column in the trace; `kind` is true, estimate or sigma."""
+        """Return its column in the trace; `kind` is true, estimate or sigma."""
         ending = re.sub("[ /]", "_", self.unit.replace("^", ""))
         return f"{self.key}_{kind}" if self.unit == "1" else f"{self.key}_{kind}_{ending}"
 
@@ -66,7 +66,7 @@ DYNAMICS = (
 
 @cache
 def parameters(model: str) -> tuple[Quantity, ...]:
-    """The parameters of a model, in the firmware's order. Raises SettingsError for a model that is none."""
+    """Return the parameters of a model, in the firmware's order. Raise SettingsError for a model that is none."""
     return tuple(
         Quantity(name, unit, _WORDS.get(name, name), _symbol(name), setting(name).least < 0.0)
         for name, unit in model_parameters(model)
@@ -74,12 +74,13 @@ def parameters(model: str) -> tuple[Quantity, ...]:
 
 
 def quantities(model: str) -> tuple[Quantity, ...]:
-    """All that is judged of an estimator with this model."""
+    """Return all that is judged of an estimator with this model."""
     return parameters(model) + DYNAMICS
 
 
 def recorded_name(column: str) -> str:
-    """The column of an estimate as a replayed log has it: k_p_recorded_N_m of k_p_estimate_N_m, nis_recorded of nis."""
+    """Return the column of an estimate as a replayed log has it: k_p_recorded_N_m of k_p_estimate_N_m, nis_recorded
+    of nis."""
     for kind in ("_estimate", "_sigma"):
         if kind in column:
             return column.replace(kind, "_recorded" if kind == "_estimate" else "_recorded_sigma")

@@ -25,9 +25,10 @@ _OTHER_UNIT = 30.0
 
 
 def sample_array(samples: Mapping[str, Any], period: float) -> NDArray[Any]:
-    """An array of lever_sample_t from columns, which native.run_samples() describes; `period`: sample_period [s].
+    """Return an array of lever_sample_t from columns, which native.run_samples() describes; `period`: sample_period
+    [s].
 
-    Raises LeverError.
+    Raise LeverError.
     """
     if not isinstance(samples, Mapping):
         raise LeverError(f"samples are a {type(samples).__name__}: give its columns, as {{'time_us': …, 'theta': …}}")

@@ -29,7 +29,7 @@ _LINE_BYTES = 510
 
 
 def parse_assignment(text: str) -> tuple[str, str | float]:
-    """Name and checked value of the text `name = value`. Raises SettingsError."""
+    """Return name and checked value of the text `name = value`. Raise SettingsError."""
     name, equals, value = (part.strip(_BLANK) for part in text.partition("="))
     if not equals:
         raise SettingsError(f"{name!r} has no '=': write name = value")
@@ -46,7 +46,7 @@ def parse_assignment(text: str) -> tuple[str, str | float]:
 
 
 def setting_value(row: Setting, text: str) -> float:
-    """What is written for a setting, in its unit or with one of its units. Raises UnitError."""
+    """Return what is written for a setting, in its unit or with one of its units. Raise UnitError."""
     quantity = units.split(text)
     if quantity is None:
         allowed = ", ".join(units.spellings(row.unit))
@@ -56,7 +56,7 @@ def setting_value(row: Setting, text: str) -> float:
 
 
 def read_assignments(path: str | os.PathLike[str]) -> dict[str, str | float]:
-    """What a settings file sets. Raises SettingsError with file and line."""
+    """Return what a settings file sets. Raise SettingsError with file and line."""
     assignments: dict[str, str | float] = {}
     for place, text in lines_of(path):
         try:
@@ -67,8 +67,8 @@ def read_assignments(path: str | os.PathLike[str]) -> dict[str, str | float]:
 
 
 def lines_of(path: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
-    """The lines of a file, as FILE:LINE and text, without comments, blanks around it and lines of these alone. Raises
-    SettingsError."""
+    """Yield the lines of a file, as FILE:LINE and text, without comments, blanks around it and lines of these alone.
+    Raise SettingsError."""
     try:
         content = Path(path).read_bytes()
     except OSError as error:
@@ -84,19 +84,19 @@ def lines_of(path: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
 
 
 def make_config(assignments: Assignments) -> Config:
-    """The configuration with the firmware's defaults in all but `assignments`. Raises SettingsError."""
+    """Return the configuration with the firmware's defaults in all but `assignments`. Raise SettingsError."""
     choices: dict[str, Any] = {name: value for name, value in assignments.items() if name in CHOICES}
     settings: dict[str, Any] = {name: value for name, value in assignments.items() if name not in CHOICES}
     return Config(**choices, settings=settings)
 
 
 def format_config(config: Config) -> str:
-    """The text of a settings file that holds all of `config`."""
+    """Return the text of a settings file that holds all of `config`."""
     return format_assignments({**config.choices, **config.settings})
 
 
 def format_assignments(assignments: Assignments, notes: Mapping[str, str] | None = None) -> str:
-    """The text of a settings file that holds these; `notes` by name go into the comments."""
+    """Return the text of a settings file that holds these; `notes` by name go into the comments."""
     comments = {what: f"one of {', '.join(enum_names(f'lever_{what}').values())}" for what in CHOICES}
     comments |= {row.name: f"[{row.unit}] {row.meaning}" for row in settings_table()}
     comments |= {name: f"{comments[name]}; {note}" for name, note in (notes or {}).items()}

@@ -38,13 +38,13 @@ class Contents:
 
 
 def own_c(package: str, names: Iterable[str]) -> dict[str, Path]:
-    """Files in the folder c/ of a package, by their names."""
+    """Return files in the folder c/ of a package, by their names."""
     folder = Path(str(files(package))) / "c"
     return {name: folder / name for name in names}
 
 
 def core_c(*folders: str) -> dict[str, Path]:
-    """The C of the estimator core by its path: all of it, or only the headers and what is in these folders."""
+    """Return the C of the estimator core by its path: all of it, or only the headers and what is in these folders."""
     root = native_file("sources/lever_cdkf.h").parent
     found = {path.relative_to(root).as_posix(): path for path in sorted(root.rglob("*")) if path.is_file()}
     return {
@@ -53,14 +53,14 @@ def core_c(*folders: str) -> dict[str, Path]:
 
 
 def check(path: Path) -> None:
-    """Raises LeverError for what would fail at the end of write()."""
+    """Raise LeverError for what would fail at the end of write()."""
     check_writable(path)
     headers()
     compiler()
 
 
 def write(path: Path, contents: Contents) -> None:
-    """Writes an FMU. Raises LeverError."""
+    """Write an FMU. Raise LeverError."""
     with tempfile.TemporaryDirectory(prefix="lever.") as name:
         folder = Path(name)
         _fill(folder, contents)
@@ -113,11 +113,11 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 def c_string(text: str) -> str:
-    """A string literal of C."""
+    """Return a string literal of C."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'
 
 
 def float_list(values: Sequence[float]) -> str:
-    """An initialiser of an array of float, exact to the bit."""
+    """Return an initialiser of an array of float, exact to the bit."""
     return "{" + ", ".join(f"{float(value)!r}f" for value in values) + "}"

@@ -22,19 +22,19 @@ _LINES_SHOWN = 3
 
 
 def platform_tuple() -> str:
-    """The folder of binaries for this machine, such as x86_64-linux."""
+    """Return the folder of binaries for this machine, such as x86_64-linux."""
     machine = platform.machine().lower()
     system = {"darwin": "darwin", "win32": "windows"}.get(sys.platform, "linux")
     return f"{_MACHINES.get(machine, machine)}-{system}"
 
 
 def library_suffix() -> str:
-    """Of a shared library in an FMU."""
+    """Return the library suffix of a shared library in an FMU."""
     return {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
 
 
 def headers() -> Path:
-    """The folder with the headers of FMI 3.0, which FMPy brings. Raises LeverError without it."""
+    """Return the folder with the headers of FMI 3.0, which FMPy brings. Raise LeverError without it."""
     require("fmu")
     spec = find_spec("fmpy")
     assert spec is not None
@@ -43,7 +43,7 @@ def headers() -> Path:
 
 
 def compiler() -> list[str]:
-    """The C compiler as a command: CC, or what is found. Raises LeverError."""
+    """Return the C compiler as a command: CC, or what is found. Raise LeverError."""
     named = shlex.split(os.environ.get("CC", ""))
     if named:
         if shutil.which(named[0]) is None:
@@ -56,7 +56,7 @@ def compiler() -> list[str]:
 
 
 def compile_library(folder: Path, sources: Sequence[str], library: Path) -> None:
-    """Compiles `sources` (paths below `folder`, which is where their headers are from, too) into `library`. Raises
+    """Compile `sources` (paths below `folder`, which is where their headers are from, too) into `library`. Raises
     LeverError."""
     library.parent.mkdir(parents=True)
     include = ("-I", str(folder), "-isystem", str(headers()))

@@ -25,7 +25,7 @@ _DESCRIPTION = (
 
 
 def variables(table: str) -> list[Variable]:
-    """The variables of the bus, by the names of the standard."""
+    """Return the variables of the bus, by the names of the standard."""
     rows = []
     for row in read_table(table):
         if row.type == "BINARY":
@@ -42,7 +42,7 @@ def variables(table: str) -> list[Variable]:
 
 
 def files_of_fmu() -> Mapping[str, bytes]:
-    """The terminal, and the manifest of the standard, by their paths in the FMU."""
+    """Return the terminal, and the manifest of the standard, by their paths in the FMU."""
     return {
         "terminalsAndIcons/terminalsAndIcons.xml": _terminals(),
         "extra/org.fmi-standard.fmi-ls-bus/fmi-ls-manifest.xml": _manifest(),

@@ -22,8 +22,8 @@ _FAULT = "fault_"
 
 
 def controller(config: Config, aircraft: AircraftResponse | None, has_bus: bool = False) -> Contents:
-    """What is in the FMU of an estimator that starts with `config`, and watches the margin with `aircraft`; its inputs
-    are signals, or the frames of a CAN bus."""
+    """Return what is in the FMU of an estimator that starts with `config`, and watches the margin with `aircraft`;
+    its inputs are signals, or the frames of a CAN bus."""
     watched = "" if aircraft is None else f"; it watches the margin to collective bounce with {aircraft.name}"
     model = Model(
         identifier="lever_controller",
@@ -43,7 +43,7 @@ def controller(config: Config, aircraft: AircraftResponse | None, has_bus: bool 
 
 
 def variables(config: Config, has_bus: bool) -> list[Variable]:
-    """All variables in the order of their value references."""
+    """Return all variables in the order of their value references."""
     table = _table("controller.def")
     named = {f"parameter_{number}": each for number, each in enumerate(model_parameters(config.choices["model"]), 1)}
     rows = []

@@ -55,7 +55,7 @@ class Model:
 
 
 def model_description(model: Model, made: str | None = None) -> bytes:
-    """The content of modelDescription.xml; `made`: when, in place of now."""
+    """Return the content of modelDescription.xml; `made`: when, in place of now."""
     root = Element(
         "fmiModelDescription",
         fmiVersion="3.0",
@@ -94,7 +94,7 @@ def model_description(model: Model, made: str | None = None) -> bytes:
 
 
 def build_description(identifier: str, sources: Sequence[str]) -> bytes:
-    """The content of sources/buildDescription.xml; `sources` are paths below that folder."""
+    """Return the content of sources/buildDescription.xml; `sources` are paths below that folder."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     files = SubElement(
@@ -107,14 +107,14 @@ def build_description(identifier: str, sources: Sequence[str]) -> bytes:
 
 
 def xml_text(root: Element) -> bytes:
-    """A document."""
+    """Return a document."""
     ElementTree.indent(root)
     content: bytes = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
     return content + b"\n"
 
 
 def _number(value: float) -> str:
-    """The shortest text of a number, without a point where it is whole."""
+    """Return the shortest text of a number, without a point where it is whole."""
     return repr(int(value)) if value == int(value) else repr(value)
 
 

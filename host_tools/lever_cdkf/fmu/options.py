@@ -14,5 +14,5 @@ def add_out_option(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def print_written(path: Path) -> None:
-    """Says what has been made."""
+    """Say what has been made."""
     print(f"Written to {path}, {path.stat().st_size / 1e6:.1f} MB")

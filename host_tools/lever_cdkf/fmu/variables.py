@@ -38,7 +38,7 @@ class Variable:
 
 
 def read_table(text: str) -> Iterator[Variable]:
-    """The rows FMU_VARIABLE(name, type, role, unit, start, meaning) of a .def file."""
+    """Yield the rows FMU_VARIABLE(name, type, role, unit, start, meaning) of a .def file."""
     for row in _ROW.finditer(text):
         is_enumeration = row["type"] == "ENUMERATION"
         yield Variable(

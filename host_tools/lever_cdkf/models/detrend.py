@@ -23,7 +23,7 @@ class Detrend:
         return sum(self._levels)
 
     def rate(self, deviation: float, corner: float) -> float:
-        """Of the level, where its last section leaves this deviation; corner [Hz]."""
+        """Return the rate of the level, where its last section leaves this deviation; corner [Hz]."""
         rate, seen = 0.0, deviation
         for level, slope, damping in zip(self._levels[::-1], self._slopes[::-1], DAMPING[::-1], strict=True):
             rate += slope + damping * 2.0 * math.pi * corner * seen
@@ -31,7 +31,7 @@ class Detrend:
         return rate
 
     def hold(self) -> None:
-        """The level stays where it is until the next value."""
+        """Hold the level where it is until the next value."""
         self._slopes = [0.0] * len(DAMPING)
 
     def begin(self, level: float) -> None:
@@ -39,7 +39,7 @@ class Detrend:
         self._levels, self._slopes = [level] + [0.0] * (len(DAMPING) - 1), [0.0] * len(DAMPING)
 
     def step(self, value: float, corner: float, dt: float) -> float:
-        """The deviation of `value` from the level before it, `dt` [s] after the last one; corner [Hz]."""
+        """Return the deviation of `value` from the level before it, `dt` [s] after the last one; corner [Hz]."""
         w = 2.0 * math.pi * corner
         deviation = value
         for i, damping in enumerate(DAMPING):

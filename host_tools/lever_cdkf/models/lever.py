@@ -33,7 +33,7 @@ class Lever:
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, float], preload: str) -> "Lever":
-        """The lever of firmware/lever_settings.def."""
+        """Return the lever of firmware/lever_settings.def."""
         if preload not in ("fixed", "trim"):
             raise ValueError(f'preload: "{preload}" is neither "fixed" nor "trim"')
         return cls(
@@ -84,7 +84,7 @@ class Lever:
         return self.length**2 * k_p * arm + self.stiffness - GRAVITY * self.unbalance(m_p) * sine
 
     def step(self, x: Array, p: Array, u: tuple[float | Array, ...], trim: float | Array, dt: float) -> Array:
-        """The states dt [s] later under constant inputs, by the linearly implicit midpoint rule.
+        """Return the states dt [s] later under constant inputs, by the linearly implicit midpoint rule.
 
         `x` (2, …), `p` (3, …), inputs and trim broadcast against each other. Second order in dt; the damping is taken
         implicitly, so no damping is too large.
@@ -98,7 +98,7 @@ class Lever:
         return np.array((theta + dt * (rate + 0.5 * change), rate + change))
 
     def dynamics(self, p: Array, trim: float | Array) -> Array:
-        """Natural frequency [Hz] and damping ratio [1] about the trim of parameters (3, …), shape (2, …)."""
+        """Return natural frequency [Hz] and damping ratio [1] about the trim of parameters (3, …), shape (2, …)."""
         m_p, c_p, k_p = p
         angle = np.full_like(m_p, trim)
         inertia = self.total_inertia(m_p)

@@ -37,17 +37,17 @@ class Linear(ABC):
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, float], preload: str) -> "Linear":
-        """The model of firmware/lever_settings.def."""
+        """Return the model of firmware/lever_settings.def."""
         if preload not in ("fixed", "trim"):
             raise ValueError(f'preload: "{preload}" is neither "fixed" nor "trim"')
         return cls(settings["lever_preload_angle"], preload)
 
     @abstractmethod
     def coefficients(self, p: Array, u: Inputs) -> tuple[Array, Array, Array]:
-        """Stiffness [1/s²], damping [1/s] and drive, per unit of mass, of parameters (3, …)."""
+        """Return stiffness [1/s²], damping [1/s] and drive, per unit of mass, of parameters (3, …)."""
 
     def step(self, x: Array, p: Array, u: Inputs, trim: float | Array, dt: float) -> Array:
-        """The states dt [s] later under constant inputs, by the linearly implicit midpoint rule.
+        """Return the states dt [s] later under constant inputs, by the linearly implicit midpoint rule.
 
         x (2, …) and p (3, …) broadcast against each other. Second order in dt; no damping is too large.
         """
@@ -58,7 +58,8 @@ class Linear(ABC):
         return np.array((theta + dt * (rate + 0.5 * change), rate + change))
 
     def dynamics(self, p: Array, trim: float | Array) -> Array:
-        """Natural frequency [Hz] and damping ratio [1] of parameters (3, …), shape (2, …), the same about any trim.
+        """Return natural frequency [Hz] and damping ratio [1] of parameters (3, …), shape (2, …), the same about any
+        trim.
 
         Without a restoring stiffness there is neither, and both are 0.
         """
@@ -93,7 +94,7 @@ class Hand(Linear):
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, float], preload: str) -> "Hand":
-        """The mass of the hand is the first guess of m_p."""
+        """Take the first guess of m_p as the mass of the hand."""
         lever = Lever.from_settings(settings, preload)
         inertia = float(lever.total_inertia(np.array(settings["m_p"])))
         return cls(settings["lever_preload_angle"], preload, lever.length, inertia)

@@ -27,7 +27,8 @@ class Transfer:
         return response
 
     def dominant_mode(self) -> tuple[FloatArray, FloatArray]:
-        """Natural frequency |p| / 2 pi [Hz] and damping ratio -Re p / |p| [1] of the dominant mode, each (times,).
+        """Return natural frequency |p| / 2 pi [Hz] and damping ratio -Re p / |p| [1] of the dominant mode, each
+        (times,).
 
         In partial fractions the response is a sum r / (s - p) over the poles p; a mode is a pole with its conjugate.
         Dominant is the one whose own terms have the largest mean square over BAND. Poles must be distinct.
@@ -45,7 +46,7 @@ class Transfer:
 
 
 def evaluate(polynomials: FloatArray, s: ComplexArray) -> ComplexArray:
-    """The polynomials (times, powers) at s, (points,) or (times, points), by Horner's rule: (times, points)."""
+    """Return the polynomials (times, powers) at s, (points,) or (times, points), by Horner's rule: (times, points)."""
     value = np.zeros((len(polynomials), 1), dtype=np.complex128)
     for coefficient in polynomials.T:
         value = value * s + coefficient[:, None]
@@ -53,7 +54,7 @@ def evaluate(polynomials: FloatArray, s: ComplexArray) -> ComplexArray:
 
 
 def roots(polynomials: FloatArray) -> ComplexArray:
-    """The roots of each row (times, powers): the eigenvalues of its companion matrix, (times, powers - 1)."""
+    """Return the roots of each row (times, powers): the eigenvalues of its companion matrix, (times, powers - 1)."""
     monic = polynomials / polynomials[:, :1]
     degree = monic.shape[1] - 1
     companion = np.zeros((len(monic), degree, degree))

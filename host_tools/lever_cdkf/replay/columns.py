@@ -41,7 +41,8 @@ class Columns:
         """Recorded estimates that belong to another sample than the one before them."""
 
     def of(self, rows: Rows) -> Trace:
-        """The columns of trace.csv without truth; with those of a recorded estimator, if there is one, at the end."""
+        """Return the columns of trace.csv without truth; with those of a recorded estimator, if there is one, at the
+        end."""
         decoded = _Decoded(rows)
         trace: Trace = {"time_s": self._timeline.seconds(rows["time_us"], decoded.fields("BASE_SAMPLE")["time_us"])}
         for column, message, field in (*MEASURED, *ESTIMATED):
@@ -71,7 +72,7 @@ class Columns:
 
 
 def _without(faults: FloatArray, bits: int) -> FloatArray:
-    """Masks without some bits; NaN stays."""
+    """Return masks without some bits; NaN stays."""
     finite = np.isfinite(faults)
     return np.where(finite, (np.where(finite, faults, 0.0).astype(np.int64) & ~bits).astype(np.float64), np.nan)
 
@@ -86,7 +87,7 @@ class _Decoded:
         self._held: dict[str, tuple[NDArray[np.intp], dict[str, FloatArray]]] = {}
 
     def misplaced(self, message: str) -> int:
-        """How many came that are not of their row's sample, by their time_low."""
+        """Return how many came that are not of their row's sample, by their time_low."""
         return int(np.sum(self._came(message) & ~self._own(message)))
 
     def fields(self, message: str) -> dict[str, FloatArray]:
@@ -141,7 +142,7 @@ class _Decoded:
 
 
 def model_numbers(rows: Rows) -> Iterator[tuple[int, int]]:
-    """Row and number of the estimator's model, where it is first told and wherever it changes."""
+    """Yield row and number of the estimator's model, where it is first told and wherever it changes."""
     slot = SLOTS["PILOT_PARAMETERS"]
     fresh = np.flatnonzero((rows["fresh"] >> slot) & 1)
     numbers = (rows["data"][fresh, slot, 1] >> 4) & 7

@@ -28,7 +28,7 @@ class Commands:
         self._identifier = codec.message(NAME).frame_id
 
     def applied(self, frames: Frames) -> Frames:
-        """The frames as they are to be fed."""
+        """Return the frames as they are to be fed."""
         for index in np.flatnonzero(frames["id"] == self._identifier):
             data = frames["data"][index].tobytes()
             if frames["length"][index] == 8 and codec.check(self._identifier, data):

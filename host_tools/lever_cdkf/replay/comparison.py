@@ -22,7 +22,7 @@ class _Signal:
 
 
 def signals(model: str) -> list[_Signal]:
-    """What is compared: states, NIS, and each quantity with its standard deviation."""
+    """Return what is compared: states, NIS, and each quantity with its standard deviation."""
     units = {"theta": "rad", "theta_dot": "rad/s", "nis": "1"}
     compared = [_Signal(field, units[field], column, None) for column, _, field in ESTIMATED]
     for each in quantities(model):

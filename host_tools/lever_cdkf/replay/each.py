@@ -44,11 +44,11 @@ class Replayed:
     """Of its trace, reduced."""
 
     def keep(self, rows: Mapping[str, FloatArray]) -> None:
-        """What replay() hands over of the trace."""
+        """Keep a piece of the trace that replay() hands over."""
         self.rows = rows
 
     def row(self) -> Row:
-        """What the table says of it."""
+        """Return what the table says of it."""
         if self.summary is None:
             return {"log": Path(self.log).name, "problem": self.problem}
         row: dict[str, Any] = {
@@ -65,8 +65,8 @@ class Replayed:
 def replay_each(
     logs: Sequence[str], options_of: Callable[[str], Options], out: Path | None, progress: Progress | None = None
 ) -> list[Replayed]:
-    """Replays each log; with `out`, its files are in a folder of it that is called as the log is. What is wrong with a
-    log is its row's `problem`, and the others go on."""
+    """Replay each log; with `out`, its files are in a folder of it that is called as the log is. What is wrong with
+    a log is its row's `problem`, and the others go on."""
     replays = []
     for log, folder in zip(logs, _folders(logs), strict=True):
         each = Replayed(log)
@@ -80,15 +80,15 @@ def replay_each(
 
 
 def rows_of(replays: Sequence[Replayed]) -> list[Row]:
-    """All rows with the same columns, those of the fullest."""
+    """Return all rows with the same columns, those of the fullest."""
     rows = [each.row() for each in replays]
     columns = max(rows, key=len).keys()
     return [{name: row.get(name) for name in columns} for row in rows]
 
 
 def write(replays: Sequence[Replayed], out: Path, inputs: Sequence[str]) -> list[str]:
-    """Writes the page and the table, as far as their extras are installed; returns their names. `inputs` are files
-    beside the logs. Raises LeverError."""
+    """Write the page and the table, as far as their extras are installed; return their names. `inputs` are files
+    beside the logs. Raise LeverError."""
     logs = [each.log for each in replays]
     origin = provenance([*logs, *inputs])
     names = [name for name, extra in ((PAGE, "report"), (TABLE, "files")) if not missing(extra)]
@@ -102,7 +102,7 @@ def write(replays: Sequence[Replayed], out: Path, inputs: Sequence[str]) -> list
 
 
 def _folders(logs: Sequence[str]) -> list[str]:
-    """A name for each: that of the log without its ending, and a number where another has it."""
+    """Return a name for each: that of the log without its ending, and a number where another has it."""
     names: list[str] = []
     for log in logs:
         stem = Path(log.removesuffix(".gz")).stem
@@ -138,7 +138,7 @@ def _page(replays: Sequence[Replayed]) -> str:
 
 
 def _labels(replays: Sequence[Replayed]) -> list[str]:
-    """The names of the logs, with their folders where the names alone are the same."""
+    """Return the names of the logs, with their folders where the names alone are the same."""
     names = [Path(each.log).name for each in replays]
     return [name if names.count(name) == 1 else each.log for name, each in zip(names, replays, strict=True)]
 
@@ -155,7 +155,7 @@ def _cells(row: Row) -> dict[str, str]:
 
 
 def _figure(replays: Sequence[Replayed]) -> Figure | None:
-    """A row a quantity, a curve a log."""
+    """Return a row a quantity, a curve a log."""
     shown = [each for each in replays if len(each.rows.get("time_s", ()))]
     models = [each.summary.estimator.model for each in shown if each.summary is not None]
     if not models:

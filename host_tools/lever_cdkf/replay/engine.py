@@ -81,9 +81,9 @@ def replay(
     progress: Progress | None = None,
     keep: Callable[[Mapping[str, FloatArray]], None] | None = None,
 ) -> ReplaySummary:
-    """Replays logs, one after another in time, and returns what summary.json says; with `out_dir` also writes bus.log,
+    """Replays logs, one after another in time, and return what summary.json says; with `out_dir` also writes bus.log,
     the signals, report.html (with the extra `report`) and summary.json there, all or none, and hands the trace,
-    reduced, to `keep`. Raises LeverError, also rather than write over a log."""
+    reduced, to `keep`. Raise LeverError, also rather than write over a log."""
     logs = list(logs)
     traffic: Traffic | MappedTraffic
     if options.reading is None:
@@ -166,7 +166,7 @@ class _Replay:
         self._recorded.take({name: float(column[-1]) for name, column in said.items() if len(column)})
 
     def _take(self, rows: Rows, last: bool = False) -> None:
-        """Gathers rows, so that what is done with columns pays."""
+        """Gather rows, so that what is done with columns pays."""
         self._waiting.append(rows)
         if last or sum(map(len, self._waiting)) >= _ROWS_AT_ONCE:
             gathered = np.concatenate(self._waiting)
@@ -192,7 +192,7 @@ class _Replay:
             self._folder.signals.add(trace, published, recorded)
 
     def _start(self, rows: Rows) -> Columns:
-        """Everything that has to know the model."""
+        """Return everything that has to know the model."""
         self._model_number = next((number for _, number in model_numbers(rows)), 0)
         self.model = enum_names("lever_model")[self._model_number]
         there = bool(np.any(rows["known"] >> min(RECORDED.values())))
@@ -210,7 +210,7 @@ class _Replay:
         return Columns(self._timeline, self.model, with_recorded, watched, self._absent())
 
     def _absent(self) -> tuple[str, ...]:
-        """Faults of inputs that the mapping does not have."""
+        """Return faults of inputs that the mapping does not have."""
         if not isinstance(self._traffic, MappedTraffic):
             return ()
         return tuple(fault for fault, key in OPTIONAL.items() if key not in self._traffic.loaded.inputs)
@@ -218,7 +218,7 @@ class _Replay:
     # --- what comes of it ---------------------------------------------------------------------------------------------
 
     def summary(self) -> ReplaySummary:
-        """The content of summary.json, but for the provenance of files."""
+        """Return the content of summary.json, but for the provenance of files."""
         figures, health, aircraft = self.figures, self._feeder.estimator.health(), self._options.aircraft
         summary = ReplaySummary(
             estimator=self._estimator(),
@@ -283,7 +283,7 @@ class _Replay:
         )
 
     def finish(self, folder: Folder, summary: ReplaySummary) -> ReplaySummary:
-        """Completes the files and puts them into place; returns the summary with their provenance."""
+        """Completes the files and puts them into place; return the summary with their provenance."""
         summary = replace(summary, provenance=folder.complete())
         if not missing("report"):
             write_page(RecordedRun(self.kept, summary), folder.outputs.path("report.html"))
@@ -298,6 +298,6 @@ def _calendar(time_us: int) -> str | None:
 
 
 def _without_folder(reason: str) -> str:
-    """A reason that begins with the path of a log: the same wherever that is."""
+    """Return a reason that begins with the path of a log: the same wherever that is."""
     path, colon, rest = reason.partition(": ")
     return printable(f"{Path(path).name}{colon}{rest}")

@@ -35,7 +35,7 @@ class Folder:
         self._bus_log.add(frames)
 
     def complete(self) -> Provenance:
-        """Completes the files; returns their provenance. Raises LeverError."""
+        """Complete the files; return their provenance. Raise LeverError."""
         self.signals.close()
         if self._bus_log is not None:
             self._bus_log.close()

@@ -46,8 +46,8 @@ class Proof:
         self._time_of = codec.raw_field("BASE_SAMPLE", "time_us")
 
     def pieces(self, frames: Frames, last: bool = False) -> Iterator[tuple[Frames, Snapshot | None]]:
-        """The frames to feed, in pieces; the estimator has the state of the snapshot, if there is one, after its piece.
-        Some are held back until the next call, or the `last`."""
+        """Yield the frames to feed, in pieces; the estimator has the state of the snapshot, if there is one, after
+        its piece. Some are held back until the next call, or the `last`."""
         held = frames if self._held is None else np.concatenate((self._held, frames))
         self._held = held
         found = snapshots.find(held)
@@ -86,14 +86,14 @@ class Proof:
     # --- where to cut -------------------------------------------------------------------------------------------------
 
     def _may_start(self, held: Frames, found: list[Snapshot]) -> bool:
-        """The first whole snapshot is there, or there will be none."""
+        """Return whether the first whole snapshot is there, or there will be none."""
         samples = held["time_us"][held["id"] == self._base]  # a COMMAND may be of long before
         span = abs(int(samples[-1] - samples[0])) if len(samples) else 0
         silent = not (held["id"] == codec.message(snapshots.NAME).frame_id).any()
         return any(each.state for each in found) or span > (_SILENT_US if silent else _LONGEST_US)
 
     def _place(self, held: Frames, snapshot: Snapshot) -> int | None:
-        """Of the last BASE_SAMPLE of its sample before it."""
+        """Return the place of the last BASE_SAMPLE of its sample before it."""
         before = np.flatnonzero(held["id"][: snapshot.begin] == self._base)[-_SAMPLES_LATE:]
         for place in before[::-1]:
             if self._time_of(held["data"][place].tobytes()) == snapshot.time_us:
@@ -101,7 +101,7 @@ class Proof:
         return None
 
     def _end_of_certain(self, held: Frames, found: list[Snapshot], places: list[int | None]) -> int:
-        """Frames before it belong to no snapshot that is still to come."""
+        """Return frames before it belong to no snapshot that is still to come."""
         if found and not found[-1].ended:
             begin = found[-1].begin
             if abs(held["time_us"][-1] - held["time_us"][begin]) < _LONGEST_US:
@@ -169,7 +169,7 @@ def choices_of(estimator: Estimator) -> dict[str, str]:
 
 
 def in_words(counts: Snapshots | None) -> str:
-    """A sentence or two for the verdict."""
+    """Return a sentence or two for the verdict."""
     if counts is None:
         return ""
     if counts.not_compared is not None:

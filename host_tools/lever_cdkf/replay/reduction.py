@@ -40,7 +40,7 @@ def _any_bit(rows: FloatArray) -> FloatArray:
 
 
 def _rules(name: str) -> tuple[Reduce, ...]:
-    """What a stretch, or a pair of stretches, leaves of a column."""
+    """Return what a stretch, or a pair of stretches, leaves of a column."""
     if name == "faults":
         return (_any_bit,)
     if name == "bounce":
@@ -72,7 +72,8 @@ class Stretches:
         self._rest = {name: values[done:].copy() for name, values in columns.items()}
 
     def rows(self) -> dict[str, FloatArray]:
-        """The columns reduced, two rows a stretch: least and greatest of what moves quickly, else twice the first.
+        """Return the columns reduced, two rows a stretch: least and greatest of what moves quickly, else twice the
+        first.
 
         As they came where there are few. Times are those of the first sample and of the middle.
         """
@@ -106,7 +107,7 @@ class Stretches:
 class Groups:
     """What `of` makes of each `size` samples of some columns; the last ones, fewer than that, are left out.
 
-    `of` takes the columns, as many samples as are whole groups, and returns arrays with an element a group.
+    `of` takes the columns, as many samples as are whole groups, and return arrays with an element a group.
     """
 
     def __init__(self, size: int, of: Callable[..., tuple[FloatArray, ...]]) -> None:
@@ -125,7 +126,7 @@ class Groups:
             self._reduced.append(self._of(*(values[:whole] for values in joined)))
 
     def all(self) -> tuple[FloatArray, ...] | None:
-        """What came of all groups; None if there was none."""
+        """Return what came of all groups; None if there was none."""
         return tuple(np.concatenate(parts) for parts in zip(*self._reduced, strict=True)) if self._reduced else None
 
 
@@ -148,7 +149,7 @@ class Ends:
         self._tail.append(_some(trace, time >= time[-1] - self._seconds))
 
     def near(self, start: float) -> dict[str, FloatArray]:
-        """The samples of `seconds` from `start` on, which is at either end."""
+        """Return the samples of `seconds` from `start` on, which is at either end."""
         parts = self._head if start <= 0.0 else self._tail
         joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         inside = (joined["time_s"] >= start) & (joined["time_s"] <= start + self._seconds)

@@ -58,7 +58,7 @@ class Figures:
                 self._extremes[name] = min(least, float(finite.min())), max(greatest, float(finite.max()))
 
     def estimates(self) -> dict[str, Estimate]:
-        """The last estimate of each quantity with its standard deviation, and between what it was."""
+        """Return the last estimate of each quantity with its standard deviation, and between what it was."""
         by_key = {}
         for each in self._quantities:
             least, greatest = self._extremes.get(each.column("estimate"), (None, None))
@@ -72,22 +72,22 @@ class Figures:
         return by_key
 
     def modes_s(self) -> dict[str, float]:
-        """Seconds in each mode."""
+        """Return seconds in each mode."""
         names = enum_names("lever_mode")
         return {names[mode]: round(count * self._period, 9) for mode, count in sorted(self._modes.items())}
 
     def whiteness(self) -> Whiteness | None:
-        """Of the residuals; None where there are too few."""
+        """Return the whiteness of the residuals; None where there are too few."""
         residuals = self._residuals.all()
         return None if residuals is None else whiteness.of_averages(residuals[0], self._average_s)
 
     def nis(self) -> Nis:
-        """Of the judged samples."""
+        """Return the nis of the judged samples."""
         return self._innovations.figures()
 
 
 def failure(summary: ReplaySummary) -> str:
-    """Why a replay did not pass, in a line; empty when it did."""
+    """Return why a replay did not pass, in a line; empty when it did."""
     reasons = []
     if "fault" in summary.modes_s:
         reasons.append(f"the estimator was in fault for {summary.modes_s['fault']:g} s")
@@ -98,7 +98,7 @@ def failure(summary: ReplaySummary) -> str:
 
 
 def verdict(summary: ReplaySummary) -> str:
-    """The replay in a few sentences."""
+    """Return the replay in a few sentences."""
     sentences = [
         f"Trouble: {failure(summary)}." if failure(summary) else "",
         summary.warning,
@@ -114,7 +114,7 @@ def verdict(summary: ReplaySummary) -> str:
 
 
 def warning(summary: ReplaySummary, tune_command: str) -> str:
-    """What the estimator says against its estimates, and what to do; `tune_command` tunes the log."""
+    """Return what the estimator says against its estimates, and what to do; `tune_command` tunes the log."""
     said = trust.warning(summary.fault_shares, summary.flagged_share)
     step = trust.next_step(summary.fault_shares, tune_command)
     return f"{said} Next: {step}." if said and step else said
@@ -134,7 +134,7 @@ def _time_estimated(summary: ReplaySummary) -> list[str]:
 
 
 def _troubles(summary: ReplaySummary) -> list[str]:
-    """What the reader has to know before believing the rest."""
+    """Return what the reader has to know before believing the rest."""
     troubles, recording = [], summary.recording
     if mapping := recording.mapping:
         troubles += [f"{note}." for note in mapping.notes]
@@ -160,7 +160,7 @@ def _troubles(summary: ReplaySummary) -> list[str]:
 
 
 def _protection(mapping: Mapped) -> list[str]:
-    """What E2E protection has found, or that there was none."""
+    """Return what E2E protection has found, or that there was none."""
     sentences = []
     for name, counts in mapping.messages.items():
         wrong = [f"{count:,} {what}" for what, count in vars(counts).items() if count and what != "frames"]
@@ -174,7 +174,7 @@ def _protection(mapping: Mapped) -> list[str]:
 
 
 def _recorded_estimates(recording: RecordingSummary) -> list[str]:
-    """Why estimates in the log are not compared with the new ones."""
+    """Return why estimates in the log are not compared with the new ones."""
     troubles = []
     if recording.answers_of_other_contract:
         troubles.append(

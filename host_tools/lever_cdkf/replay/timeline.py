@@ -52,7 +52,7 @@ class Timeline:
         self._last: tuple[int, int] | None = None  # recorded and sample time of the last one [us]
 
     def seconds(self, recorded_us: IntArray, sample_us: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Times [s] of samples with these recorded times and these 32-bit times of the sender."""
+        """Return times [s] of samples with these recorded times and these 32-bit times of the sender."""
         sender = sample_us.astype(np.int64)
         if not len(sender):
             return np.zeros(0)
@@ -70,7 +70,7 @@ class Timeline:
         return seconds
 
     def _steps(self, recorded: IntArray, sender: IntArray) -> IntArray:
-        """The steps to believe, none below 0; sender's are of 32-bit times."""
+        """Return the steps to believe, none below 0; sender's are of 32-bit times."""
         short = (sender + WRAP // 2) % WRAP - WRAP // 2
         unwrapped = short + WRAP * np.rint((recorded - short) / WRAP).astype(np.int64)
         agreed = (np.abs(recorded - unwrapped) < AGREEMENT) & (unwrapped > 0)

@@ -29,8 +29,8 @@ def write_report(
     path: str | os.PathLike[str],
     story: Story | None = None,
 ) -> None:
-    """Writes the page. `trace` has the columns of trace.csv, of which only time_s is indispensable; `summary` is that
-    of summary.json, where there is one. Raises LeverError when `path` cannot be written."""
+    """Write the page. `trace` has the columns of trace.csv, of which only time_s is indispensable; `summary` is that
+    of summary.json, where there is one. Raise LeverError when `path` cannot be written."""
     from .run import Run  # here, so that importing this package stays quick
 
     write_page(Run(trace, summary), path, story)

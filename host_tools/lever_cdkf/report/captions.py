@@ -37,7 +37,7 @@ def about(run: Run) -> list[str]:
 
 
 def parameters_caption(run: Run) -> str:
-    """What the chart of the parameters shows."""
+    """Return what the chart of the parameters shows."""
     shown = f"{PARAMETERS[run.model]}, with a band of ±2σ"
     if run.mismatch is not None:
         return (
@@ -50,7 +50,7 @@ def parameters_caption(run: Run) -> str:
 
 
 def dynamics_caption(run: Run) -> str:
-    """What the chart of natural frequency and damping ratio shows."""
+    """Return what the chart of natural frequency and damping ratio shows."""
     sentences = [
         "What decides about collective bounce: how fast arm and lever swing by themselves, and how quickly that dies "
         "out (a damping ratio of 1 is no swing at all)."
@@ -63,7 +63,7 @@ def dynamics_caption(run: Run) -> str:
 
 
 def feedthrough_caption(run: Run) -> str:
-    """What the Bode diagram with its band shows, and how good it was where the truth is known."""
+    """Return what the Bode diagram with its band shows, and how good it was where the truth is known."""
     sentences = [
         "The same at one time, as a Bode diagram: magnitude and phase, and below the measured coherence of floor and "
         "lever over the whole run. Where that is low, noise, torque or the pilot's own movement move the lever, and "
@@ -81,7 +81,7 @@ def feedthrough_caption(run: Run) -> str:
 
 
 def excitation_caption(run: Run) -> str:
-    """What the chart of the excitation shows."""
+    """Return what the chart of the excitation shows."""
     sentences = ["What shakes the lever. Without motion there is nothing to learn from."]
     if _has_scale(run):
         sentences.append(
@@ -91,12 +91,12 @@ def excitation_caption(run: Run) -> str:
 
 
 def _has_scale(run: Run) -> bool:
-    """Whether the parameters have a common scale that base motion alone does not determine."""
+    """Return whether the parameters have a common scale that base motion alone does not determine."""
     return run.model in ("lever", "linear_physical")
 
 
 def whiteness_caption(run: Run) -> str:
-    """What the chart of the autocorrelation shows."""
+    """Return what the chart of the autocorrelation shows."""
     verdict = whiteness.verdict(run.whiteness)
     return (
         "What is left of the rate: autocorrelation of measured minus estimated rate, averaged over 20 ms. Chance alone "

@@ -13,8 +13,8 @@ from .figure import Spec
 
 
 def document(title: str, body: str, figures: Mapping[str, Spec], style: str = "") -> str:
-    """The whole page. `title` is text, `body` HTML; `figures` are drawn where an element has their key as id; `style`
-    is CSS beyond page.css."""
+    """Return the whole page. `title` is text, `body` HTML; `figures` are drawn where an element has their key as id;
+    `style` is CSS beyond page.css."""
     require("report")
     import plotly.offline
 

@@ -21,14 +21,14 @@ TICKS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50)
 
 
 def line(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) -> Spec:
-    """A curve. `more` are further properties of the trace; those of its line start with line_."""
+    """Return a curve. `more` are further properties of the trace; those of its line start with line_."""
     style = {"color": f"@{colour}", "width": 1.8}
     style |= {key[5:]: more.pop(key) for key in list(more) if key.startswith("line_")}
     return _trace(x, y, name, row) | {"mode": "lines", "line": style} | more
 
 
 def hover(quantity: str, unit: str = "") -> Spec:
-    """The text under the pointer, for a trace: what it is, its value, and the unit, "" for none."""
+    """Return the text under the pointer, for a trace: what it is, its value, and the unit, "" for none."""
     return {"hovertemplate": f"{quantity} %{{y:.4g}}{unit and ' '}{unit}<extra></extra>"}
 
 
@@ -39,7 +39,7 @@ def dots(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) 
 
 
 def band(x: Array, low: Array, high: Array, name: str, colour: str, row: int = 0, **more: Any) -> list[Spec]:
-    """The area between two curves."""
+    """Return the area between two curves."""
     finite = np.isfinite(low) & np.isfinite(high)
     edge = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
     lower = _trace(x[finite], low[finite], name, row) | edge | {"showlegend": False}
@@ -54,7 +54,8 @@ def _trace(x: Array, y: Array, name: str, row: int) -> Spec:
 
 
 def axis_range(columns: list[Array], settled: slice, share: float = 0.08, zero: bool = False) -> list[float] | None:
-    """An axis range that shows all that the columns do in `settled`, so that a wild start does not squeeze the rest."""
+    """Return an axis range that shows all that the columns do in `settled`, so that a wild start does not squeeze
+    the rest."""
     values = np.concatenate([column[settled] for column in columns])
     values = values[np.isfinite(values)]
     if not values.size:
@@ -85,7 +86,7 @@ class Figure:
     """What choices() has set."""
 
     def add(self, *traces: Spec) -> None:
-        """Adds traces; a name that is there already is shown once in the legend."""
+        """Add traces; a name that is there already is shown once in the legend."""
         for trace in traces:
             listed = any(trace["name"] == other["name"] and other.get("showlegend", True) for other in self.traces)
             self.traces.append({"showlegend": False} | trace if listed else trace)
@@ -106,12 +107,12 @@ class Figure:
             self.shapes.append({"type": "line", "line": style} | ends)
 
     def choose(self, of: list[Spec], first: int = 0, slider: str = "") -> None:
-        """Has the user choose by buttons, or by a slider with that name. Each of them is a "label", and "data" and
+        """Have the user choose by buttons, or by a slider with that name. Each of them is a "label", and "data" and
         "layout" for Plotly.update of the "traces" (all); `first` is what the figure shows as it is."""
         self.choices = {"of": of, "first": first, "slider": slider}
 
     def spec(self) -> Spec:
-        """The figure for page.js."""
+        """Return the figure for page.js."""
         layout: Spec = {
             "height": self.height,
             "shapes": self.shapes,
@@ -136,7 +137,7 @@ def time_axis(end: float) -> Spec:
 
 
 def frequency_axis(low: float, high: float) -> Spec:
-    """A logarithmic axis from `low` to `high` [Hz]."""
+    """Return a logarithmic axis from `low` to `high` [Hz]."""
     limits = [math.log10(low), math.log10(high)]
     hover = {"text": "%{x:.3g} Hz"}
     return axis("frequency [Hz]", type="log", range=limits, tickvals=TICKS, unifiedhovertitle=hover)

@@ -24,13 +24,13 @@ class Page:
         self.figures: dict[str, Spec] = {}
 
     def section(self, key: str, short: str, title: str, *parts: str) -> None:
-        """Adds a section of HTML parts, unless all are empty; `short` is its title in the table of contents."""
+        """Add a section of HTML parts, unless all are empty; `short` is its title in the table of contents."""
         if any(parts):
             self.contents.append((key, short))
             self.sections.append(f'<section id="{key}"><h2>{title}</h2>{"".join(parts)}</section>')
 
     def figure(self, key: str, figure: Figure | Spec | None, caption: str) -> str:
-        """The place of a figure with its caption, as HTML; nothing without a figure."""
+        """Return the place of a figure with its caption, as HTML; nothing without a figure."""
         if figure is None:
             return ""
         self.figures[key] = spec = figure.spec() if isinstance(figure, Figure) else figure
@@ -38,7 +38,7 @@ class Page:
         return f"<figure>{place}<figcaption>{caption}</figcaption></figure>"
 
     def html(self, answer: str, style: str = "", *, beside: bool = False) -> str:
-        """The whole page. `answer` is HTML above the first section, or, where there is room, `beside` it."""
+        """Return the whole page. `answer` is HTML above the first section, or, where there is room, `beside` it."""
         links = "".join(f'<a href="#{key}">{name}</a>' for key, name in self.contents)
         first, rest = "".join(self.sections[:1]), "".join(self.sections[1:])
         body = (
@@ -60,7 +60,7 @@ class Story(NamedTuple):
 
 
 def build(run: Run, story: Story | None = None) -> str:
-    """The whole page."""
+    """Return the whole page."""
     scenario = run.simulated.scenario if run.simulated else None
     title = (scenario and (scenario.title or scenario.name)) or ", ".join(run.recording.logs if run.recording else ())
     page = Page(title or "recorded run", _subtitle(run), "lever sim" if run.simulated else "lever replay")

@@ -46,19 +46,19 @@ class Run:
         self.time: Array = np.asarray(trace["time_s"], dtype=np.float64)
 
     def column(self, name: str) -> Array | None:
-        """A column, or None when it is absent or holds no value at all."""
+        """Return a column, or None when it is absent or holds no value at all."""
         if name not in self.trace:
             return None
         values: Array = np.asarray(self.trace[name], dtype=np.float64)
         return values if np.isfinite(values).any() else None
 
     def first_of(self, *names: str) -> Array | None:
-        """The first of several columns that is there."""
+        """Return the first of several columns that is there."""
         name = self.first_name(*names)
         return None if name is None else self.column(name)
 
     def first_name(self, *names: str) -> str | None:
-        """Its name."""
+        """Return its name."""
         return next((name for name in names if self.column(name) is not None), None)
 
     def truth(self, quantity: Quantity) -> Array | None:
@@ -130,12 +130,12 @@ class Run:
         return len(self.time)
 
     def close_up(self, start: float, seconds: float) -> Mapping[str, Array]:
-        """Every column at every sample of a stretch [s]."""
+        """Return every column at every sample of a stretch [s]."""
         inside = (self.time >= start) & (self.time <= start + seconds)
         return {name: np.asarray(values)[inside] for name, values in self.trace.items()}
 
     def innovations(self, seconds: float) -> Averages | None:
-        """Of stretches of about `seconds` [s]; None without NIS."""
+        """Return the innovations of stretches of about `seconds` [s]; None without NIS."""
         nis = self.column("nis")
         if nis is None:
             return None
@@ -143,7 +143,7 @@ class Run:
         return nis_averages(self.time, nis, self._outputs(), size, seconds)
 
     def spectrum(self, name: str) -> tuple[Array, Array]:
-        """Frequencies [Hz] and power spectral density of a column."""
+        """Return frequencies [Hz] and power spectral density of a column."""
         return welch(np.asarray(self.trace[name], dtype=np.float64), self.sample_period)
 
     @cached_property
@@ -170,7 +170,7 @@ class Run:
         return None if theta is None else slow_trim(self.time, theta, self.settings["trim_corner"])
 
     def _outputs(self) -> Array:
-        """How many outputs each sample had."""
+        """Return how many outputs each sample had."""
         names = ("theta_measured_rad", "theta_dot_measured_rad_s")
         return sum(
             (np.isfinite(self.trace[name]).astype(float) for name in names if name in self.trace),

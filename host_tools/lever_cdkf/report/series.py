@@ -9,7 +9,7 @@ from ..arrays import Array
 
 
 def packed(values: Array) -> dict[str, object]:
-    """A column as plotly.js reads typed arrays: four bytes a value instead of ten characters; NaN is a gap."""
+    """Return a column as plotly.js reads typed arrays: four bytes a value instead of ten characters; NaN is a gap."""
     array = np.asarray(values, dtype="<f4")
     text = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
     spec: dict[str, object] = {"dtype": "f4", "bdata": text}
@@ -34,7 +34,7 @@ def spread_indices(count: int, most: int, keep: NDArray[np.intp] | None = None) 
 
 
 def envelope(time: Array, values: Array, buckets: int = 1000) -> tuple[Array, Array]:
-    """Least and greatest value of each of `buckets` stretches of time, in turn: a dense curve as seen from afar.
+    """Return least and greatest value of each of `buckets` stretches of time, in turn: a dense curve as seen from afar.
 
     A short column is returned as it is. A stretch without any value gives NaN.
     """
@@ -51,7 +51,8 @@ def envelope(time: Array, values: Array, buckets: int = 1000) -> tuple[Array, Ar
 
 
 def jumps(time: Array, columns: list[Array], relative: float = 0.02, apart: float = 0.05) -> list[float]:
-    """Times [s] at which a column steps by more than `relative` in one sample; steps closer than `apart` are one."""
+    """Return times [s] at which a column steps by more than `relative` in one sample; steps closer than `apart` are
+    one."""
     if len(time) < 2:
         return []
     stepped = np.zeros(len(time) - 1, dtype=bool)
@@ -66,7 +67,7 @@ def jumps(time: Array, columns: list[Array], relative: float = 0.02, apart: floa
 
 
 def runs(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of every stretch in which `active` is true."""
+    """Return first and last index of every stretch in which `active` is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], active, [False])).astype(np.int8)))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
 
@@ -97,7 +98,7 @@ class Welch:
         self._rest = joined[len(windows) * hop :].copy()
 
     def spectrum(self) -> tuple[Array, Array]:
-        """Frequencies [Hz] and density; of what there is, if that is shorter than a window."""
+        """Return frequencies [Hz] and density; of what there is, if that is shorter than a window."""
         if self._windows:
             length, power = self._length, self._power / self._windows
         else:
@@ -118,7 +119,7 @@ class Welch:
 
 
 def welch(values: Array, sample_period: float, seconds: float = 4.0) -> tuple[Array, Array]:
-    """Frequencies [Hz] and power spectral density of a whole column, by Welch."""
+    """Return frequencies [Hz] and power spectral density of a whole column, by Welch."""
     averaged = Welch(sample_period, seconds)
     averaged.add(values)
     return averaged.spectrum()

@@ -19,7 +19,7 @@ LARGEST_ERROR = 10.0  # [% rms] of a run that is called good
 
 
 def number(value: Any, digits: int = 3) -> str:
-    """A figure for reading; a dash for one that is not there."""
+    """Return a figure for reading; a dash for one that is not there."""
     if value is None or value != value:
         return NOTHING
     if isinstance(value, str | bool):
@@ -30,29 +30,29 @@ def number(value: Any, digits: int = 3) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """A figure with so many decimals; a dash for one that is not there."""
+    """Return a figure with so many decimals; a dash for one that is not there."""
     return NOTHING if value is None else f"{value:.{decimals}f}"
 
 
 def percent(fraction: float | None) -> str:
-    """A part of one as per cent."""
+    """Return a part of one as per cent."""
     return NOTHING if fraction is None else f"{100.0 * fraction:.0f} %"
 
 
 def seconds(values: Sequence[float | None] | None) -> str:
-    """Times after the start and each change [s]; a dash where it was not reached."""
+    """Return times after the start and each change [s]; a dash where it was not reached."""
     if not values or all(value is None for value in values):
         return NOTHING
     return f"{' / '.join(fixed(value, 1) for value in values)} s"
 
 
 def figures_of(run: Run, quantity: Quantity) -> Quality | None:
-    """The summary's figures of one quantity, when it has them."""
+    """Return the summary's figures of one quantity, when it has them."""
     return run.simulated.parameters.get(quantity.key) if run.simulated else None
 
 
 def answer(run: Run) -> str:
-    """The headline, the figures behind it, and what the summary says."""
+    """Return the headline, the figures behind it, and what the summary says."""
     judged = [quantity for quantity in run.quantities if figures_of(run, quantity)]
     figures, note = _accuracy(run, judged) if judged else (_last_estimates(run), "")
     said = run.summary.verdict.replace(run.summary.warning, "").strip() if run.summary else _UNJUDGED
@@ -64,14 +64,15 @@ def answer(run: Run) -> str:
 
 
 def verdict(run: Run) -> str:
-    """The headline: a warning of the estimator before any figure."""
+    """Return the headline: a warning of the estimator before any figure."""
     warning = html.escape(run.summary.warning).replace(" %", "\u00a0%") if run.summary else ""
     lines = [f"<strong>{warning}</strong>", _headline(run)] if warning else [f"<strong>{_headline(run)}</strong>"]
     return f'<p class="verdict {_mood(run)}">{"<br>".join(lines)}</p>'
 
 
 def _headline(run: Run) -> str:
-    """Of the natural frequency: how well it was estimated, or, where its truth is not known, what it was at the end."""
+    """Return the headline of the natural frequency: how well it was estimated, or, where its truth is not known,
+    what it was at the end."""
     quantity = DYNAMICS[0]
     figures = figures_of(run, quantity)
     if figures and figures.rms_percent is not None:
@@ -99,7 +100,7 @@ def _mood(run: Run) -> str:
 
 
 def _accuracy(run: Run, judged: list[Quantity]) -> tuple[str, str]:
-    """A table, and what its columns mean."""
+    """Return a table, and what its columns mean."""
     rows = []
     for quantity in judged:
         figures = figures_of(run, quantity)
@@ -129,7 +130,7 @@ def _last_estimates(run: Run) -> str:
 
 
 def _last(run: Run, quantity: Quantity) -> str:
-    """The last estimate with its standard deviation; empty without one."""
+    """Return the last estimate with its standard deviation; empty without one."""
     estimate, sigma = run.estimate(quantity), run.sigma(quantity)
     if estimate is None or sigma is None:
         return ""
@@ -141,7 +142,7 @@ def _last(run: Run, quantity: Quantity) -> str:
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Cells are HTML; the first column is the name of the row."""
+    """Return a table whose cells are HTML; the first column is the name of the row."""
     head = "".join(f"<th>{cell}</th>" for cell in header)
     body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
     top = f"<thead><tr>{head}</tr></thead>" if any(header) else ""
@@ -149,7 +150,7 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def errors_table(run: Run) -> str:
-    """Every figure that the summary has of every quantity."""
+    """Return every figure that the summary has of every quantity."""
     titles = (
         ("rms error", "%"),
         ("bias", "%"),
@@ -218,7 +219,7 @@ _RECORDING_FIGURES = (
 
 
 def recording_table(run: Run) -> str:
-    """What was in the log."""
+    """Return what was in the log."""
     recording = run.recording
     if recording is None:
         return ""
@@ -266,7 +267,7 @@ def run_table(run: Run) -> str:
 
 
 def settings_table(run: Run) -> str:
-    """The estimator's settings, what differs from the default in bold; the others are not printed on paper."""
+    """Return the estimator's settings, what differs from the default in bold; the others are not printed on paper."""
     rows = []
     for setting in native.settings_table():
         value = run.settings[setting.name]
@@ -276,7 +277,7 @@ def settings_table(run: Run) -> str:
 
 
 def flat(values: Any, prefix: str = "") -> list[tuple[str, str]]:
-    """A nested dictionary as rows of dotted key and value, for the tables of how the run was made."""
+    """Return a nested dictionary as rows of dotted key and value, for the tables of how the run was made."""
     if isinstance(values, dict):
         return [row for key, value in values.items() for row in flat(value, f"{prefix}.{key}" if prefix else str(key))]
     if isinstance(values, list | tuple) and any(isinstance(value, dict) for value in values):

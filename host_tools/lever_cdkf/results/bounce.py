@@ -43,7 +43,7 @@ class Bounce:
             self._correction = max(self._correction or 0.0, float(np.nanmax(np.abs(correction))))
 
     def summary(self, aircraft: AircraftResponse) -> Stability:
-        """What it came to."""
+        """Return what it came to."""
         names = enum_names("lever_bounce")
         states = {names[state]: round(count * self._period, 9) for state, count in sorted(self._states.items())}
         margin, sigma, at = self._least or (None, None, None)

@@ -48,7 +48,8 @@ class Coherence:
         self._rest = joined[:, cut.shape[1] * hop :].copy()
 
     def spectrum(self) -> tuple[FloatArray, FloatArray]:
-        """Frequencies [Hz] and coherence [1]; NaN where a signal has no power, and with fewer than two windows."""
+        """Return frequencies [Hz] and coherence [1]; NaN where a signal has no power, and with fewer than two
+        windows."""
         frequency: FloatArray = np.fft.rfftfreq(self._length, self._period).astype(np.float64)
         coherence: FloatArray = np.full(len(frequency), np.nan)
         power = self._power.prod(axis=0)
@@ -57,7 +58,7 @@ class Coherence:
         return frequency, coherence
 
     def chance(self) -> float:
-        """What unrelated signals stay below at 95 % of the frequencies [1]; windows count as independent."""
+        """Return what unrelated signals stay below at 95 % of the frequencies [1]; windows count as independent."""
         return 1.0 - 0.05 ** (1.0 / (self.windows - 1)) if self.windows > 1 else 1.0
 
 

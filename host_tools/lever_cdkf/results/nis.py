@@ -16,7 +16,7 @@ CHI_SQUARE_95 = {freedom: chi_square_quantile(0.95, freedom) for freedom in (1, 
 
 
 def freedom(theta_measured: FloatArray, theta_dot_measured: FloatArray) -> NDArray[np.int64]:
-    """How many outputs each sample had."""
+    """Return how many outputs each sample had."""
     outputs: NDArray[np.int64] = np.isfinite(theta_measured).astype(np.int64) + np.isfinite(theta_dot_measured)
     return outputs
 
@@ -63,7 +63,7 @@ class Innovations:
 
 
 def verdict(nis: Nis) -> str:
-    """What NIS says, in a sentence."""
+    """Return what NIS says, in a sentence."""
     if nis.mean is None or nis.expected is None:
         return ""
     ratio = nis.mean / nis.expected

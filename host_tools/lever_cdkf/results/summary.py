@@ -337,12 +337,12 @@ class ReplaySummary(Summary):
 
 
 def text(summary: Summary) -> str:
-    """The content of summary.json."""
+    """Return the content of summary.json."""
     return json_text(dataclasses.asdict(summary))
 
 
 def read(path: str | Path) -> SimulationSummary | ReplaySummary:
-    """A summary.json. Raises LeverError."""
+    """Return a summary.json. Raise LeverError."""
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
         if content["schema"] != SCHEMA:
@@ -355,7 +355,7 @@ def read(path: str | Path) -> SimulationSummary | ReplaySummary:
 
 
 def of(kind: type[_Content], content: Mapping[str, Any]) -> _Content:
-    """A dataclass of JSON's dictionaries and lists. Raises TypeError for a field that is unknown or missing."""
+    """Return a dataclass of JSON's dictionaries and lists. Raise TypeError for a field that is unknown or missing."""
     if not isinstance(content, Mapping):
         raise TypeError(f"{content!r} is not of {kind}")
     hints = typing.get_type_hints(kind)

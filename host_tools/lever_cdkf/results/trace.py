@@ -68,7 +68,7 @@ TRUE_MARGIN = "gain_margin_true_dB"
 
 
 def quantity_fields(model: str) -> Iterator[tuple[str, str, str]]:
-    """Column, message and field of all that the estimator says of the pilot."""
+    """Yield column, message and field of all that the estimator says of the pilot."""
     for quantity in quantities(model):
         values, sigmas = ("PILOT_DYNAMICS",) * 2 if quantity in DYNAMICS else ("PILOT_PARAMETERS", "PILOT_SIGMA")
         yield quantity.column("estimate"), values, quantity.key
@@ -76,18 +76,18 @@ def quantity_fields(model: str) -> Iterator[tuple[str, str, str]]:
 
 
 def write_csv_header(columns: Iterable[str], file: BinaryIO) -> None:
-    """The names of the columns of trace.csv."""
+    """Write the names of the columns of trace.csv."""
     file.write((",".join(columns) + "\n").encode("ascii"))
 
 
 def write_csv_rows(trace: Trace, file: BinaryIO) -> None:
-    """A line for each sample, with six decimals; NaN stands as `NaN`, a whole number that is not known as nothing."""
+    """Write a line for each sample, with six decimals; NaN is written as `NaN`, an unknown whole number as nothing."""
     for first in range(0, len(trace["time_s"]), _ROWS_AT_ONCE):
         file.write(csv_lines({name: values[first : first + _ROWS_AT_ONCE] for name, values in trace.items()}).data)
 
 
 def csv_lines(trace: Trace) -> NDArray[np.uint8]:
-    """Rows as text, to be written as bytes."""
+    """Return rows as text, to be written as bytes."""
     numbers = np.stack(list(trace.values()), axis=1, dtype=np.float64)
     text = np.empty(numbers.size * int(_lib.BULK_NUMBER), np.uint8)
     source, target = ffi.from_buffer("double[]", numbers), ffi.from_buffer("char[]", text)

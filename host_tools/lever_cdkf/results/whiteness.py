@@ -69,7 +69,7 @@ def measure(values: FloatArray, period: float) -> Whiteness | None:
 
 
 def average_size(period: float) -> int:
-    """Samples in an average."""
+    """Return samples in an average."""
     return max(1, round(AVERAGE / period))
 
 
@@ -100,7 +100,7 @@ def of_averages(averages: FloatArray, step: float) -> Whiteness | None:
 
 
 def averages(values: FloatArray, size: int) -> FloatArray:
-    """Of `size` values each; NaN where more than half are."""
+    """Return the averages of `size` values each; NaN where more than half are."""
     rows = values[: len(values) // size * size].reshape(-1, size)
     finite = np.isfinite(rows)
     count = finite.sum(axis=1)
@@ -110,7 +110,7 @@ def averages(values: FloatArray, size: int) -> FloatArray:
 
 
 def verdict(measured: Whiteness | None) -> str:
-    """What the autocorrelation of the residual says, and what it cannot see."""
+    """Return what the autocorrelation of the residual says, and what it cannot see."""
     if measured is None:
         return ""
     size = f"{measured.largest:.2f} after {1000.0 * measured.largest_after_s:.0f} ms"

@@ -15,8 +15,8 @@ from .units import KINDS, normal, split_name
 
 
 def columns_of(data: Any) -> Columns:
-    """Values and unit of each column of a pandas or polars frame, an xarray Dataset, a structured array, or a mapping
-    of arrays; an index or coordinate with a name, or of times, is a column too. Raises LeverError."""
+    """Return values and unit of each column of a pandas or polars frame, an xarray Dataset, a structured array, or a
+    mapping of arrays; an index or coordinate with a name, or of times, is a column too. Raise LeverError."""
     raw: dict[str, Any]
     if hasattr(data, "data_vars"):  # xarray
         raw = {str(name): each for name, each in data.variables.items()}
@@ -46,7 +46,7 @@ def columns_of(data: Any) -> Columns:
 
 
 def signals_by_input(columns: Columns, units: Mapping[str, str]) -> dict[str, Signal]:
-    """The columns that are inputs of the firmware, by their names. Raises LeverError."""
+    """Return the columns that are inputs of the firmware, by their names. Raise LeverError."""
     unknown = sorted(set(units) - {"time", *KINDS})
     if unknown:
         raise LeverError(f"units of {', '.join(unknown)}: they are of {', '.join(KINDS)}")
@@ -65,7 +65,7 @@ def signals_by_input(columns: Columns, units: Mapping[str, str]) -> dict[str, Si
 
 
 def _time(columns: Columns, units: Mapping[str, str]) -> tuple[str, FloatArray]:
-    """The name of the column of time, and it in seconds. Raises LeverError."""
+    """Return the name of the column of time, and it in seconds. Raise LeverError."""
     name = find_time(columns, "samples")
     values, own = columns[name]
     unit = units.get("time", own)

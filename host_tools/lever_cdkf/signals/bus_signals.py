@@ -36,7 +36,7 @@ _CHECKS: dict[int, Callable[[bytearray, Any], bool]] = {
 
 
 def load_database(path: str | Path) -> Database:
-    """A DBC, or what else cantools reads. Raises LeverError."""
+    """Return a DBC, or what else cantools reads. Raise LeverError."""
     try:
         loaded = cantools.database.load_file(path, strict=False, encoding=_encoding(Path(path)))
     except OSError as error:
@@ -49,7 +49,8 @@ def load_database(path: str | Path) -> Database:
 
 
 def _encoding(path: Path) -> str | None:
-    """Of a DBC, which does not say it: UTF-8 where it is that, else what cantools takes for its format."""
+    """Return the encoding of a DBC, which does not say it: UTF-8 where it is that, else what cantools takes for its
+    format."""
     if path.suffix.lower() != ".dbc":
         return None
     try:
@@ -60,7 +61,7 @@ def _encoding(path: Path) -> str | None:
 
 
 def find(database: Database, name: str, where: str) -> tuple[Message, Field]:
-    """Message and signal by MESSAGE.SIGNAL, or SIGNAL where it is the only one. Raises LeverError."""
+    """Return message and signal by MESSAGE.SIGNAL, or SIGNAL where it is the only one. Raise LeverError."""
     messages = {message.name: message for message in database.messages}
     message_name, dot, signal_name = name.rpartition(".")
     if dot and message_name not in messages:
@@ -77,7 +78,7 @@ def find(database: Database, name: str, where: str) -> tuple[Message, Field]:
 
 
 def of_fd(message: Message) -> bool:
-    """Whether its frames are CAN FD."""
+    """Return whether its frames are CAN FD."""
     return bool(message.is_fd) or message.length > 8
 
 
@@ -108,7 +109,7 @@ class BusSignals:
     def __init__(
         self, database: Database, wanted: Iterable[tuple[Message, Field]], protected: dict[str, Protection]
     ) -> None:
-        """Raises LeverError for a protection that does not fit the database."""
+        """Raise LeverError for a protection that does not fit the database."""
         self.counts: dict[str, MessageCounts] = {}
         """By message."""
         self.fd: set[str] = set()
@@ -128,7 +129,7 @@ class BusSignals:
                 raise LeverError(f"the mapping protects {name}, which is no message of the database")
 
     def add(self, frames: Frames, recording: Recording) -> None:
-        """Keeps what is needed of further frames."""
+        """Keep what is needed of further frames."""
         names = recording.buses.names()
         for (identifier, extended), message in self._messages.items():
             same = (frames["id"] == identifier) & ((frames["flags"] & EXTENDED != 0) == extended)
@@ -145,7 +146,7 @@ class BusSignals:
                 received.data += [raw[8 * k : 8 * k + length] for k, length in enumerate(kept["length"].tolist())]
 
     def add_fd(self, path: str, first_us: int, last_us: int) -> None:
-        """Keeps what is needed of the frames of CAN FD in a log, from one time to another. Raises LeverError."""
+        """Keep what is needed of the frames of CAN FD in a log, from one time to another. Raise LeverError."""
         import can
 
         try:
@@ -162,7 +163,7 @@ class BusSignals:
             raise LeverError(f"{path}: its frames of CAN FD cannot be read: {error}") from None
 
     def signal(self, message: Message, name: str, channel: str | None, log: str) -> tuple[Signal, str]:
-        """A signal of a message, and on which bus: if not given, the only one that has it. Raises LogError."""
+        """Return a signal of a message, and on which bus: if not given, the only one that has it. Raise LogError."""
         bus = self._bus(message, channel, log)
         if (message.name, bus) not in self._decoded:
             self._decoded[message.name, bus] = self._decode(message, self._frames[message.name, bus])
@@ -171,7 +172,7 @@ class BusSignals:
         return Signal(f"{message.name}.{name}", time, values, each.unit or "", each.comment or ""), bus
 
     def buses(self, message: Message) -> list[str]:
-        """Which buses have it."""
+        """Return which buses have it."""
         return sorted(bus for name, bus in self._frames if name == message.name)
 
     def _bus(self, message: Message, channel: str | None, log: str) -> str:
@@ -187,7 +188,7 @@ class BusSignals:
         raise LogError(f"{log}: no frame of {what} in it")
 
     def _decode(self, message: Message, received: Received) -> dict[str, Decoded]:
-        """The signals of each frame that is right; a multiplexed one is not in all of them."""
+        """Return the signals of each frame that is right; a multiplexed one is not in all of them."""
         counts = self.counts.setdefault(message.name, MessageCounts())
         counts.frames += len(received.data)
         protection = self._protected.get(message.name)
@@ -229,7 +230,7 @@ class _Counter:
             self._turn = values - 1 if protection.profile == 1 else values  # profile 1 leaves out the last
 
     def is_new(self, values: Any) -> bool:
-        """False for a frame that is repeated; counts it, or what was lost before it."""
+        """Return False for a frame that is repeated; counts it, or what was lost before it."""
         if self._name is None or self._name not in values:
             return True
         step = 1 if self._last is None else (int(values[self._name]) - self._last) % self._turn
@@ -240,7 +241,7 @@ class _Counter:
 
 
 def number(signal: Field, value: Any) -> float:
-    """A decoded value; NaN for none, and for a code that stands for none."""
+    """Return a decoded value; NaN for none, and for a code that stands for none."""
     if isinstance(value, NamedSignalValue):
         code = signal.conversion.raw_to_scaled(value.value, decode_choices=False)
         return float("nan") if _NO_VALUE.search(value.name) else float(code)  # type: ignore[arg-type]

@@ -27,7 +27,7 @@ def estimate(
     *,
     names: Mapping[str, str] | None = None,
 ) -> Result:
-    """The pilot's parameters, with their standard deviations, from recorded samples.
+    """Return the pilot's parameters, with their standard deviations, from recorded samples.
 
     samples: a frame of pandas or polars, a Dataset of xarray, or a mapping of arrays, with the columns time [s], theta
     [rad], theta_dot [rad/s], z_ddot [m/s²], tau_m [N m], grip_force [N]; z_ddot and one of theta and theta_dot are
@@ -61,7 +61,7 @@ def estimate(
 
 
 def _check_units(signals: Mapping[str, Signal]) -> None:
-    """Raises LeverError for values without a unit that do not look like SI."""
+    """Raise LeverError for values without a unit that do not look like SI."""
     unsaid = {key: signal for key, signal in signals.items() if not signal.unit}
     for key in ("theta", "theta_dot", "z_ddot"):
         if key in unsaid and np.isfinite(unsaid[key].values).any():

@@ -32,7 +32,7 @@ class Input:
     """What was guessed, for the user to see."""
 
     def summary(self, samples: Samples, key: str) -> MappedSignal:
-        """What summary.json says of it."""
+        """Return what summary.json says of it."""
         return MappedSignal(
             signal=self.signal.name,
             unit=self.source.unit,
@@ -49,7 +49,7 @@ class Input:
 
 
 def understood(key: str, source: Source, signal: Signal) -> Input:
-    """A signal as the input `key`. Raises LeverError."""
+    """Return a signal as the input `key`. Raise LeverError."""
     name = source.signal
     if not np.isfinite(signal.values).any():
         raise LeverError(f"{key} = {name}: the log has no valid value of it")
@@ -80,7 +80,7 @@ def understood(key: str, source: Source, signal: Signal) -> Input:
 
 
 def _scale(key: str, source: Source, signal: Signal, notes: list[str]) -> tuple[str, float]:
-    """The unit of the recorded values, and their factor to the firmware's. Raises LeverError."""
+    """Return the unit of the recorded values, and their factor to the firmware's. Raise LeverError."""
     if source.factor is not None:
         return "", source.factor
     unit = source.unit or signal.unit
@@ -118,7 +118,7 @@ def recorded_samples(inputs: Mapping[str, Input], clock: str | None = None) -> t
 
 
 def samples_of(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[Samples, list[str]]:
-    """The samples of all inputs, and notes for the user. Raises LeverError."""
+    """Return the samples of all inputs, and notes for the user. Raise LeverError."""
     samples = sample({key: each.signal for key, each in inputs.items()}, clock)
     notes = [note for each in inputs.values() for note in each.notes]
     for key, how in samples.how.items():
@@ -137,7 +137,8 @@ def samples_of(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[S
 
 
 def _disagreement(inputs: Mapping[str, Input], samples: Samples) -> list[str]:
-    """Whether the angular rate is the slope of the angle; where it is not, one of their units or signs is wrong."""
+    """Return whether the angular rate is the slope of the angle; where it is not, one of their units or signs is
+    wrong."""
     if not {"theta", "theta_dot"} <= inputs.keys():
         return []
     ratio = slope_ratio(inputs["theta"].signal, inputs["theta_dot"].signal)

@@ -87,7 +87,8 @@ class Mapping:
 
 
 def read_mapping(entries: Iterable[str]) -> Mapping:
-    """A mapping of KEY=SIGNAL[,OPTION=VALUE…] and of .toml files, later ones over earlier ones. Raises LeverError."""
+    """Return a mapping of KEY=SIGNAL[,OPTION=VALUE…] and of .toml files, later ones over earlier ones. Raises
+    LeverError."""
     sources: dict[str, Source] = {}
     protected: dict[str, Protection] = {}
     time: str | None = None
@@ -110,7 +111,7 @@ def read_mapping(entries: Iterable[str]) -> Mapping:
 
 
 def as_toml(mapping: Mapping) -> str:
-    """The text of a mapping file."""
+    """Return the text of a mapping file."""
     lines: list[str] = [] if mapping.time is None else ["[time]", f"signal = {_quoted(mapping.time)}", ""]
     for key, source in mapping.sources.items():
         lines += [f"[{key}]", f"signal = {_quoted(source.signal)}"]
@@ -217,7 +218,7 @@ def _check(where: str, key: str, source: Source) -> None:
 
 
 def _quantity(where: str, name: str, value: Any, kind: str | None) -> float:
-    """A number, or one with a unit of KINDS[kind], in SI. Raises LeverError."""
+    """Return a number, or one with a unit of KINDS[kind], in SI. Raise LeverError."""
     number, unit = split(str(value)) or ("nan", "")
     scale = 1.0 if not unit else None if kind is None else factor(kind, unit)
     if scale is None or not math.isfinite(float(number)) or isinstance(value, bool):

@@ -29,7 +29,7 @@ class Online:
     """Turns messages into frames of lever.dbc."""
 
     def __init__(self, mapping: Mapping, database: str, clock: str | None = None) -> None:
-        """Raises LeverError for a mapping that does not fit the database."""
+        """Raise LeverError for a mapping that does not fit the database."""
         loaded = load_database(database)
         self.notes: list[str] = []
         """What was decided in the beginning."""
@@ -50,8 +50,8 @@ class Online:
         self._counter = 0
 
     def take(self, identifier: int, extended: bool, data: bytes, time: float) -> list[LeverFrame]:
-        """The frames of a sample that a message completes, mostly none. Raises LeverError when signals that have been
-        looked at are not what the mapping says."""
+        """Return the frames of a sample that a message completes, mostly none. Raise LeverError when signals that
+        have been looked at are not what the mapping says."""
         frames: list[LeverFrame] = []
         for key, message, signal in self._wanted.get((identifier, extended), ()):
             try:
@@ -96,21 +96,21 @@ class Online:
     # --- samples -----------------------------------------------------------------------------------------------------
 
     def _sample(self, key: str, value: float, time: float) -> list[LeverFrame]:
-        """A sample is complete with all that comes at its rate, or with the next value of its clock."""
+        """Complete a sample with all that comes at its rate, or with the next value of its clock."""
         frames = self._frames() if key == self._clock and self._clock in self._pending else []
         self._pending[key] = time, value
         complete = self._clock in self._pending and all(map(self._belongs, self._offset))
         return frames + (self._frames() if complete else [])
 
     def _belongs(self, key: str) -> bool:
-        """Whether the last value of an input is of the sample that waits."""
+        """Return whether the last value of an input is of the sample that waits."""
         if key not in self._pending or self._clock is None or self.period is None:
             return False
         after = self._pending[key][0] - self._pending[self._clock][0]
         return abs(after - self._offset.get(key, 0.0)) <= 0.5 * self.period
 
     def _frames(self) -> list[LeverFrame]:
-        """The sample that waits; what does not belong to it is missing, and what is later than it is kept."""
+        """Return the sample that waits; what does not belong to it is missing, and what is later than it is kept."""
         assert self._clock is not None
         time = self._pending[self._clock][0]
         taken = {key for key in self._pending if self._belongs(key)}
@@ -131,7 +131,7 @@ class Online:
 
 
 def _line(key: str, source: Source) -> tuple[float, float]:
-    """Factor and offset of a source in which everything is decided."""
+    """Return factor and offset of a source in which everything is decided."""
     scale = source.factor if source.factor is not None else factor(key, source.unit)
     assert scale is not None
     sign = source.sign or 1

@@ -16,7 +16,7 @@ from .units import INPUTS, KINDS
 
 
 def own_mapping(columns: Iterable[Signal], where: str) -> Mapping:
-    """The mapping of columns that are called as the inputs are. Raises LeverError."""
+    """Return the mapping of columns that are called as the inputs are. Raise LeverError."""
     sources = {}
     for key in INPUTS:
         for each in columns:

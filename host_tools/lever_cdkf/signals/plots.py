@@ -27,7 +27,8 @@ _TICKS = 5
 
 
 def sparkline(signal: Signal, width: int) -> str:
-    """The means of `width` equal parts of its time, from least to greatest as eight heights; blank where none is."""
+    """Return the means of `width` equal parts of its time, from least to greatest as eight heights; blank where none
+    is."""
     values = _parts(signal, width)[1]
     present = values[np.isfinite(values)]
     if not len(present):
@@ -40,7 +41,7 @@ KINDS = (".html", *(f".{kind}" for kind in pictures.KINDS))
 
 
 def write(path: Path, signals: Sequence[tuple[str, Signal]], title: str, origin: Provenance) -> None:
-    """A page (.html) or picture with each signal under its heading. Raises LeverError."""
+    """Write a page (.html) or picture with each signal under its heading. Raise LeverError."""
     if path.suffix.lower() == ".html":
         write_text(path, with_provenance(_page(signals, title), origin))
         return
@@ -50,7 +51,7 @@ def write(path: Path, signals: Sequence[tuple[str, Signal]], title: str, origin:
 
 
 def _parts(signal: Signal, count: int) -> tuple[FloatArray, FloatArray]:
-    """Times and means of equal parts."""
+    """Return times and means of equal parts."""
     if not len(signal.time):
         return np.zeros(0), np.zeros(0)
     time, place = _places(signal, count)
@@ -60,14 +61,14 @@ def _parts(signal: Signal, count: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _places(signal: Signal, count: int) -> tuple[FloatArray, IntArray]:
-    """Times of the middles of equal parts, from the first value on, and the part that each value is in."""
+    """Return times of the middles of equal parts, from the first value on, and the part that each value is in."""
     first, last = float(signal.time[0]), float(signal.time[-1])
     place = ((signal.time - first) / max(last - first, 1e-9) * count).astype(np.int64)
     return (np.arange(count) + 0.5) * (last - first) / count, np.minimum(place, count - 1)
 
 
 def _ranges(signal: Signal, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Times of equal parts, with the least and the greatest value of each; NaN where there is none."""
+    """Return times of equal parts, with the least and the greatest value of each; NaN where there is none."""
     if not len(signal.time):
         return np.zeros(0), np.zeros(0), np.zeros(0)
     time, place = _places(signal, count)

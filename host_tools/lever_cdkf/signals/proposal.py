@@ -102,7 +102,8 @@ class Candidate:
 
 
 def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candidate]]:
-    """The mapping, and the candidates that it is made of. Raises LeverError where there is none for lever or base."""
+    """Return the mapping, and the candidates that it is made of. Raise LeverError where there is none for lever or
+    base."""
     moving = [signal for signal in signals if _moves(signal.values) and signal.period < 0.5]
     candidates = [_candidate(key, signal) for signal in moving for key in INPUTS]
     candidates = _with_movement(_with_slopes([each for each in candidates if each.score > _HOPELESS]))
@@ -124,14 +125,14 @@ def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candid
 
 
 def _goes_with(each: Candidate, chosen: dict[str, Candidate]) -> bool:
-    """Whether a rate is the slope of the angle, perhaps with the other sign; another rate is worse than none."""
+    """Return whether a rate is the slope of the angle, perhaps with the other sign; another rate is worse than none."""
     if each.key != "theta_dot" or "theta" not in chosen:
         return True
     return abs(slope_likeness(chosen["theta"].signal, each.signal)) > 0.5
 
 
 def _is_clear(key: str, best: Sequence[Candidate]) -> bool:
-    """Whether no other torque may be meant as well."""
+    """Return whether no other torque may be meant as well."""
     return key != "tau_m" or len(best) == 1 or best[0].score - best[1].score >= _CLEAR
 
 
@@ -142,7 +143,8 @@ def _source(each: Candidate, chosen: dict[str, Candidate], unit: str) -> Source:
 
 
 def _unit(each: Candidate, chosen: dict[str, Candidate]) -> tuple[str, tuple[str, ...]]:
-    """The unit of a signal; where it has none and a replay could not tell or would be wrong, the likely one and why."""
+    """Return the unit of a signal; where it has none and a replay could not tell or would be wrong, the likely one
+    and why."""
     if each.signal.unit:
         return each.signal.unit, ()
     if each.key == "z_ddot":
@@ -160,7 +162,7 @@ def _unit(each: Candidate, chosen: dict[str, Candidate]) -> tuple[str, tuple[str
 
 
 def words_of(name: str) -> set[str]:
-    """The words of a name: lever, angle, deg of LeverAngle_deg; without accents."""
+    """Return the words of a name: lever, angle, deg of LeverAngle_deg; without accents."""
     plain = "".join(letter for letter in unicodedata.normalize("NFKD", name) if not unicodedata.combining(letter))
     return {part.lower() for part in _PARTS.findall(plain)}
 
@@ -197,7 +199,7 @@ def _by_unit(key: str, signal: Signal) -> float:
 
 
 def _weight(weights: dict[str, float], word: str) -> float:
-    """Of a word of a name: as it is, made of several, or shortened (lvr, trq, pos)."""
+    """Return the weight of a word of a name: as it is, made of several, or shortened (lvr, trq, pos)."""
     if word in weights:
         return weights[word]
     inside = [known for known in weights if len(known) >= _COMPOUND and known in word]
@@ -209,7 +211,7 @@ def _weight(weights: dict[str, float], word: str) -> float:
 
 
 def _shortens(word: str, known: str) -> bool:
-    """Whether a word is the beginning of another, or some of its consonants in their order."""
+    """Return whether a word is the beginning of another, or some of its consonants in their order."""
     if len(word) < 3 or len(known) < _COMPOUND or word[0] != known[0]:
         return False
     letters = iter(known)
@@ -220,7 +222,7 @@ def _shortens(word: str, known: str) -> bool:
 
 
 def _moves(values: FloatArray) -> bool:
-    """Whether it is measured: not constant, and no counter."""
+    """Return whether it is measured: not constant, and no counter."""
     present = values[np.isfinite(values)]
     if len(present) < 20 or not np.ptp(present) > 0.0:
         return False
@@ -228,7 +230,7 @@ def _moves(values: FloatArray) -> bool:
 
 
 def _gravity(values: FloatArray) -> float:
-    """The level of a signal that holds gravity, in g or m/s²; 0 where it does not."""
+    """Return the level of a signal that holds gravity, in g or m/s²; 0 where it does not."""
     present = values[np.isfinite(values)]
     level, spread = float(np.median(present)), float(np.std(present))
     near = any(abs(abs(level) - gravity) < 0.15 * gravity and spread < gravity for gravity in (1.0, GRAVITY))
@@ -241,7 +243,7 @@ def _best(candidates: Iterable[Candidate], key: str) -> list[Candidate]:
 
 
 def _with_slopes(candidates: list[Candidate]) -> list[Candidate]:
-    """Angles and rates that belong together gain."""
+    """Return angles and rates that belong together gain."""
     gains: dict[tuple[str, str], tuple[float, str]] = {}
     for angle in _best(candidates, "theta"):
         for rate in _best(candidates, "theta_dot"):
@@ -252,7 +254,7 @@ def _with_slopes(candidates: list[Candidate]) -> list[Candidate]:
 
 
 def _with_movement(candidates: list[Candidate]) -> list[Candidate]:
-    """What moves with the base gains: the lever is held by an arm, the base shakes both."""
+    """Return what moves with the base gains: the lever is held by an arm, the base shakes both."""
     base = _best(candidates, "z_ddot")[:1]
     gains: dict[tuple[str, str], tuple[float, str]] = {}
     for key in ("theta", "theta_dot"):
@@ -265,7 +267,7 @@ def _with_movement(candidates: list[Candidate]) -> list[Candidate]:
 
 
 def _with_company(candidates: list[Candidate], angle: Signal, key: str) -> list[Candidate]:
-    """What is in the angle's own message gains."""
+    """Return what is in the angle's own message gains."""
     message, _, _ = angle.name.rpartition(".")
     beside = [each for each in candidates if each.key == key and message and each.signal.name.startswith(f"{message}.")]
     words = f"in the message of {angle.name}"
@@ -281,7 +283,7 @@ def _gained(candidates: list[Candidate], gains: dict[tuple[str, str], tuple[floa
 
 
 def _coherence(base: Signal, lever: Signal) -> float:
-    """Mean coherence of two signals from 2 to 8 Hz, less what chance gives."""
+    """Return mean coherence of two signals from 2 to 8 Hz, less what chance gives."""
     both = together(base, lever)
     if len(both[0]) < 8 * _SEGMENT or not all(np.isfinite(each).any() for each in both):
         return 0.0

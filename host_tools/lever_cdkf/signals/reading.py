@@ -62,7 +62,7 @@ class Loaded:
     ends_early: list[str] = field(default_factory=list)
 
     def summary(self) -> Mapped:
-        """What summary.json says of it."""
+        """Return what summary.json says of it."""
         return Mapped(
             inputs={key: each.summary(self.samples, key) for key, each in self.inputs.items()},
             clock=self.samples.clock,
@@ -75,7 +75,7 @@ class Loaded:
 
 
 def read(logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> Loaded:
-    """Samples of recorded logs, one after another in time, or of one file of columns. Raises LeverError."""
+    """Return samples of recorded logs, one after another in time, or of one file of columns. Raise LeverError."""
     paths = [str(path) for path in logs]
     for path in paths:
         _check_there(path)
@@ -133,7 +133,7 @@ def _of_table(path: str, reading: Reading) -> Loaded:
 def all_signals(
     log: str, database: str | None, channel: str | None, time: str | None, start: float, length: float
 ) -> list[Signal]:
-    """Every signal of a log or file, in a part of it. Raises LeverError."""
+    """Return every signal of a log or file, in a part of it. Raise LeverError."""
     _check_there(log)
     if is_table(log):
         signals = read_table(log, time)
@@ -158,7 +158,7 @@ def all_signals(
 
 
 def _beginning(columns: Sequence[Signal]) -> float:
-    """The first time of a file [s]."""
+    """Return the first time of a file [s]."""
     return min((float(each.time[0]) for each in columns if len(each.time)), default=0.0)
 
 
@@ -170,7 +170,7 @@ def _check_there(path: str) -> None:
 def _collect(
     reader: BusSignals, recording: Recording, start: float, length: float, progress: Progress | None
 ) -> tuple[int, tuple[str, ...]]:
-    """Hand the frames of a part to the reader; return how many there are, and where their clock was set back."""
+    """Return hand the frames of a part to the reader; return how many there are, and where their clock was set back."""
     frames = 0
     first_us: int | None = None
     clock = RunningClock(1e6 * LATE)
@@ -197,7 +197,7 @@ _EVER = 1e9  # [s]
 
 
 def column(columns: Sequence[Signal], name: str, where: str) -> Signal:
-    """A column by its name, or by the part after the last dot. Raises LeverError."""
+    """Return a column by its name, or by the part after the last dot. Raise LeverError."""
     for matches in (
         [each for each in columns if each.name == name],
         [each for each in columns if each.name.lower() in (name.lower(), split_name(name)[0].lower())],

@@ -39,12 +39,12 @@ class Signal:
         return float(np.mean(usual))
 
     def changes(self) -> bool:
-        """Whether it has more than one value."""
+        """Return whether it has more than one value."""
         present = self.values[np.isfinite(self.values)]
         return len(present) > 0 and bool((present != present[0]).any())
 
     def between(self, start: float, end: float) -> Signal:
-        """The part from `start` to `end` [s]."""
+        """Return the part from `start` to `end` [s]."""
         inside = (self.time >= start) & (self.time < end)
         return replace(self, time=self.time[inside], values=self.values[inside])
 

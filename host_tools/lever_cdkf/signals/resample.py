@@ -48,12 +48,12 @@ class Samples:
     """Values left out since they were not later than those before them."""
 
     def arrays(self) -> dict[str, FloatArray | IntArray]:
-        """What run_samples() takes."""
+        """Return what run_samples() takes."""
         return {"time_us": self.time_us, **self.columns}
 
 
 def sample(signals: Mapping[str, Signal], clock: str | None = None) -> Samples:
-    """Samples of signals in the firmware's units, by input. Raises LeverError."""
+    """Return samples of signals in the firmware's units, by input. Raise LeverError."""
     cleaned = {key: ordered(signal) for key, signal in signals.items()}
     clean = {key: signal for key, (signal, _) in cleaned.items()}
     clock = clock or _clock(clean)
@@ -72,7 +72,7 @@ def sample(signals: Mapping[str, Signal], clock: str | None = None) -> Samples:
 
 
 def check_period(period: float, key: str, name: str) -> None:
-    """Raises LeverError where the firmware takes no samples at this distance [s]."""
+    """Raise LeverError where the firmware takes no samples at this distance [s]."""
     row = setting("sample_period")
     if not row.least * 0.999 <= period <= row.greatest * 1.001:
         rate = f"every {1e3 * period:.4g} ms ({1.0 / period:.4g} Hz)" if np.isfinite(period) else "only once"
@@ -91,7 +91,7 @@ def at_period(config: Config, period: float) -> Config:
 
 
 def _clock(signals: Mapping[str, Signal]) -> str:
-    """Which of the signals makes the samples."""
+    """Return which of the signals makes the samples."""
     slowest = setting("sample_period").greatest * 1.001
     inputs = [key for key in ("z_ddot", "tau_m") if key in signals]
     inputs = [key for key in inputs if signals[key].period <= slowest] or inputs[:1]
@@ -102,7 +102,7 @@ def _clock(signals: Mapping[str, Signal]) -> str:
 
 
 def _at(time: FloatArray, period: float, signal: Signal) -> tuple[FloatArray, str]:
-    """The values of a signal at the samples' times, and how they came there."""
+    """Return the values of a signal at the samples' times, and how they came there."""
     if not len(signal.time):
         return np.full(len(time), np.nan), "slower"
     if signal.period > _SLOWER * period:
@@ -130,7 +130,7 @@ def _next_to(time: FloatArray, others: FloatArray) -> IntArray:
 
 
 def _nearest(time: FloatArray, signal: Signal, most: float) -> FloatArray:
-    """Each value at the time next to it, at most once and at most `most` [s] away; elsewhere NaN."""
+    """Return each value at the time next to it, at most once and at most `most` [s] away; elsewhere NaN."""
     taken = np.full(len(time), np.nan)
     place = _next_to(signal.time, time)
     distance = np.abs(time[place] - signal.time)

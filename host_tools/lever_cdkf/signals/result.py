@@ -111,14 +111,14 @@ class Result(Mapping[str, Estimated]):
         return _as_text(self._raw["faults"], lambda bits: ", ".join(fault_names(bits)))
 
     def columns(self) -> dict[str, tuple[NDArray[Any], str]]:
-        """Values and unit by name, as to_parquet() writes them."""
+        """Return values and unit by name, as to_parquet() writes them."""
         table: dict[str, tuple[NDArray[Any], str]] = {"time": (self.time, "s")}
         for each in self._estimated.values():
             table[each.name], table[f"{each.name}_sigma"] = (each.values, each.unit), (each.sigma, each.unit)
         return table | {"nis": (self._raw["nis"], "1"), "mode": (self.mode, ""), "flags": (self.flags, "")}
 
     def to_parquet(self, path: str | Path) -> None:
-        """Writes columns() with the units as metadata of the fields, and provenance as metadata of the file. Raises
+        """Write columns() with the units as metadata of the fields, and provenance as metadata of the file. Raises
         LeverError."""
         require("files")
         import pyarrow
@@ -137,8 +137,8 @@ class Result(Mapping[str, Estimated]):
         return {**self.config.choices, "settings": self.config.settings}
 
     def plot(self, path: str | Path | None = None, *, width: str = "double") -> Any:
-        """The parameters, natural frequency and damping ratio over time with their bands of ±2 sigma, as a Figure of
-        matplotlib, as wide as one ("single", 88 mm) or two ("double", 180 mm) columns of a journal.
+        """Return the parameters, natural frequency and damping ratio over time with their bands of ±2 sigma, as a
+        Figure of matplotlib, as wide as one ("single", 88 mm) or two ("double", 180 mm) columns of a journal.
 
         path: where to keep it (.pdf, .svg or .png), with what it shows beside it as CSV. Raises LeverError.
         """
@@ -193,7 +193,7 @@ class Result(Mapping[str, Estimated]):
 
 
 def _as_text(numbers: NDArray[Any], word: Any) -> Text:
-    """The word of each number; few of them differ."""
+    """Return the word of each number; few of them differ."""
     different, place = np.unique(numbers, return_inverse=True)
     words = np.array([word(int(number)) for number in different], dtype=np.str_)
     text: Text = words[place.reshape(-1)]

@@ -17,7 +17,7 @@ _USUAL = (1.0, 99.0)  # percentiles of the values that an axis shows
 
 
 def figure(time: FloatArray, shown: Sequence[Estimated], width: float) -> Any:
-    """A chart for each quantity with its band of ±2 sigma, `width` [inches] wide, as a Figure of matplotlib."""
+    """Return a chart for each quantity with its band of ±2 sigma, `width` [inches] wide, as a Figure of matplotlib."""
     from matplotlib.figure import Figure
 
     sheet = Figure(figsize=(width, _ROW * len(shown)), layout="constrained")

@@ -33,7 +33,7 @@ _SET_BACK = 1.0
 
 
 def is_table(path: str) -> bool:
-    """Whether a file has columns and not CAN frames. Raises LeverError."""
+    """Return whether a file has columns and not CAN frames. Raise LeverError."""
     suffix = Path(path.removesuffix(".gz")).suffix.lower()
     if suffix in (".parquet", ".pq", ".mat", ".npz", ".tsv"):
         return True
@@ -45,7 +45,8 @@ def is_table(path: str) -> bool:
 
 
 def read_table(path: str, time: str | None = None) -> list[Signal]:
-    """All columns of numbers, with the time of each [s]; `time` names the column that is it. Raises LeverError."""
+    """Return all columns of numbers, with the time of each [s]; `time` names the column that is it. Raises
+    LeverError."""
     readers: dict[str, Callable[[str, str | None], list[Signal]]] = {
         ".parquet": _parquet,
         ".pq": _parquet,
@@ -65,7 +66,7 @@ def read_table(path: str, time: str | None = None) -> list[Signal]:
 
 
 def signals_of(columns: Columns, where: str, time: str | None = None) -> list[Signal]:
-    """Columns of one length as signals over their column of time. Raises LeverError."""
+    """Return columns of one length as signals over their column of time. Raise LeverError."""
     name = find_time(columns, where, time)
     at = seconds(*columns[name], f"{where}: {name}")
     return [
@@ -76,14 +77,14 @@ def signals_of(columns: Columns, where: str, time: str | None = None) -> list[Si
 
 
 def _signal(name: str, recorded: FloatArray, values: Array, unit: str, words: str = "") -> Signal:
-    """A column over its recorded times [s], which go on where their clock was set back."""
+    """Return a column over its recorded times [s], which go on where their clock was set back."""
     clock = RunningClock(_SET_BACK)
     time = clock.running(recorded)
     return Signal(name, time, np.asarray(values, np.float64), unit, words, clock.note())
 
 
 def find_time(columns: Columns, where: str, wanted: str | None = None) -> str:
-    """The name of the column that is the time. Raises LeverError."""
+    """Return the name of the column that is the time. Raise LeverError."""
     names = list(columns)
     if wanted:
         matches = [name for name in names if wanted in (name, split_name(name)[0])]
@@ -97,7 +98,7 @@ def find_time(columns: Columns, where: str, wanted: str | None = None) -> str:
 
 
 def seconds(values: Array, unit: str, where: str) -> FloatArray:
-    """Times in seconds: numbers with a unit, or by their step; or dates. Raises LeverError."""
+    """Return times in seconds: numbers with a unit, or by their step; or dates. Raise LeverError."""
     if values.dtype.kind in "mM":
         kind = "datetime64[ns]" if values.dtype.kind == "M" else "timedelta64[ns]"
         return np.asarray(values.astype(kind).astype(np.int64), np.float64) * 1e-9
@@ -112,7 +113,7 @@ def seconds(values: Array, unit: str, where: str) -> FloatArray:
 
 
 def time_scale(values: Array) -> float:
-    """Seconds in the unit of times that do not say it: samples of this tool come every 0.1 to 20 ms."""
+    """Return seconds in the unit of times that do not say it: samples of this tool come every 0.1 to 20 ms."""
     steps = np.diff(values.astype(np.float64))
     steps = steps[steps > 0.0]
     step = float(np.median(steps)) if len(steps) else 0.0
@@ -164,7 +165,7 @@ def _mf4(path: str, time: str | None) -> list[Signal]:
 
 
 def _has_frames(path: str) -> bool:
-    """Whether an MF4 file holds CAN frames as they were on the bus."""
+    """Return whether an MF4 file holds CAN frames as they were on the bus."""
     with _opened_mf4(path) as file:
         return any("CAN_DataFrame" in name for name in file.channels_db)
 
@@ -212,7 +213,7 @@ def _hdf_array(name: str, each: Any) -> dict[str, Any]:
 
 
 def _flattened(name: str, content: Any) -> dict[str, Any]:
-    """Fields of structures by their path: IMU.z."""
+    """Return fields of structures by their path: IMU.z."""
     if isinstance(content, Mapping):
         return {
             path: each for key, inner in content.items() for path, each in _flattened(f"{name}.{key}", inner).items()
@@ -221,7 +222,7 @@ def _flattened(name: str, content: Any) -> dict[str, Any]:
 
 
 def _of_arrays(arrays: Mapping[str, Array], where: str, time: str | None) -> list[Signal]:
-    """Arrays by name; each has the time of its own structure, else the one of its length."""
+    """Return arrays by name; each has the time of its own structure, else the one of its length."""
     series = {name: np.asarray(each) for name, each in arrays.items() if np.ndim(each) == 1 and np.size(each) > 1}
     series = {name: each for name, each in series.items() if each.dtype.kind in "biufmM"}
     times = [name for name in series if (name == time if time else _TIME.match(name.rpartition(".")[2]))]

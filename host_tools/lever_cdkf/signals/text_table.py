@@ -27,7 +27,7 @@ _NOTHING = re.compile(r"|-|n/?a|nan|null|none|inf|-inf", re.IGNORECASE)
 
 
 def read(path: str) -> dict[str, tuple[Array, str]]:
-    """Values and unit of each column by its name. Raises LeverError."""
+    """Return values and unit of each column by its name. Raise LeverError."""
     text = _text(path)
     lines = text.splitlines()
     delimiter, comma, first = _layout(lines, path)
@@ -44,12 +44,12 @@ def read(path: str) -> dict[str, tuple[Array, str]]:
 
 
 def has_frames(path: str) -> bool:
-    """Whether a CSV is a log of frames as python-can writes it."""
+    """Return whether a CSV is a log of frames as python-can writes it."""
     return _start(path)[0].startswith("timestamp,arbitration_id,")
 
 
 def is_text_table(path: str) -> bool:
-    """Whether a text is a table with a header, and no log."""
+    """Return whether a text is a table with a header, and no log."""
     try:
         _layout(_start(path), path)
     except LeverError:
@@ -58,7 +58,7 @@ def is_text_table(path: str) -> bool:
 
 
 def _open(path: str) -> gzip.GzipFile | io.BufferedReader:
-    """The bytes of a text that may be compressed."""
+    """Return the bytes of a text that may be compressed."""
     with open(path, "rb") as file:
         packed = file.read(2) == b"\x1f\x8b"
     return gzip.open(path, "rb") if packed else open(path, "rb")
@@ -114,7 +114,7 @@ def _number(text: str, comma: bool = False) -> float | None:
 
 
 def _layout(lines: list[str], path: str) -> tuple[str, bool, int]:
-    """The delimiter, whether decimals have a comma, and the first line of numbers. Raises LeverError."""
+    """Return the delimiter, whether decimals have a comma, and the first line of numbers. Raise LeverError."""
     best: tuple[int, str, bool, int] = (0, "", False, 0)
     for comma in (False, True):
         for delimiter in _DELIMITERS:
@@ -128,7 +128,8 @@ def _layout(lines: list[str], path: str) -> tuple[str, bool, int]:
 
 
 def _first_row(lines: list[str], delimiter: str, comma: bool) -> tuple[int, int]:
-    """How well the lines fit, 0: not at all, and which is the first of several with as many fields, mostly numbers."""
+    """Return how well the lines fit, 0: not at all, and which is the first of several with as many fields, mostly
+    numbers."""
     rows = [_fields(line, delimiter) for line in lines]
     numbered = [[_number(each, comma) for each in row] for row in rows]
     for index, (row, values) in enumerate(zip(rows, numbered, strict=True)):
@@ -144,12 +145,12 @@ def _first_row(lines: list[str], delimiter: str, comma: bool) -> tuple[int, int]
 
 
 def _says_little(values: list[float | None]) -> bool:
-    """A time, and nothing known at it."""
+    """Return a time, and nothing known at it."""
     return None not in values and any(value == value for value in values)
 
 
 def _header(lines: list[str], delimiter: str, first: int, path: str) -> tuple[list[str], list[str]]:
-    """Names and units of the columns. Raises LeverError."""
+    """Return names and units of the columns. Raise LeverError."""
     width = len(_fields(lines[first], delimiter))
     above = [_fields(line.lstrip("#% "), delimiter) for line in lines[:first]]
     above = [row for row in above if len(row) == width]
@@ -163,7 +164,7 @@ def _header(lines: list[str], delimiter: str, first: int, path: str) -> tuple[li
 
 
 def _numbers(body: str, delimiter: str, width: int, path: str, first: int) -> Array:
-    """The numbers below the header; NaN for what is none. Raises LeverError."""
+    """Return the numbers below the header; NaN for what is none. Raise LeverError."""
     separator = None if delimiter == " " else delimiter
     try:
         return np.loadtxt(io.StringIO(body), delimiter=separator, ndmin=2, comments=None)

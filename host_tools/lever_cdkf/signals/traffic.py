@@ -55,7 +55,7 @@ class MappedTraffic:
     """A can.traffic.Traffic of logs that do not speak lever.dbc."""
 
     def __init__(self, logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> None:
-        """Reads all of it. Raises LeverError."""
+        """Read all of it. Raise LeverError."""
         self.loaded: Loaded = read(logs, reading, progress)
         self.recording = Origin(self.loaded.paths, self.loaded.damaged, self.loaded.ends_early)
         self.channel: str | None = "_".join(self.loaded.buses)[:24] or BUS
@@ -71,7 +71,7 @@ class MappedTraffic:
         return at_period(config, self.loaded.samples.period)
 
     def chunks(self) -> Iterator[Frames]:
-        """The frames."""
+        """Yield the frames."""
         frames = frames_of(self.loaded.samples)
         for first in range(0, len(frames), _SAMPLES_AT_ONCE):
             yield frames[first : first + _SAMPLES_AT_ONCE]

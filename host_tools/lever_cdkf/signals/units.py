@@ -60,29 +60,30 @@ _SPELLINGS = (
 
 
 def normal(unit: str) -> str:
-    """A unit in one spelling: "m/s2" for "m/s^2", "[m/s²]" and "m/s/s"."""
+    """Return a unit in one spelling: "m/s2" for "m/s^2", "[m/s²]" and "m/s/s"."""
     for pattern, spelling in _SPELLINGS:
         unit = re.sub(pattern, spelling, unit.lower())
     return unit
 
 
 def factor(key: str, unit: str) -> float | None:
-    """What values in `unit` are multiplied by to be in the firmware's; None for a unit that is none of this kind."""
+    """Return what values in `unit` are multiplied by to be in the firmware's; None for a unit that is none of this
+    kind."""
     return _FACTORS[KINDS[key][0]].get(normal(unit))
 
 
 def is_unit(unit: str) -> bool:
-    """Whether it is a unit of any kind."""
+    """Return whether it is a unit of any kind."""
     return any(normal(unit) in factors for factors in _FACTORS.values())
 
 
 def fitting(unit: str) -> set[str]:
-    """The inputs that may be in this unit."""
+    """Return the inputs that may be in this unit."""
     return {key for key in INPUTS if factor(key, unit) is not None}
 
 
 def split_name(label: str) -> tuple[str, str]:
-    """Name and unit of a column's label: "Angle [deg]", "Angle (deg)", "angle_deg"; "" without."""
+    """Return name and unit of a column's label: "Angle [deg]", "Angle (deg)", "angle_deg"; "" without."""
     label = label.strip()
     if bracketed := re.fullmatch(r"(.*\S)\s*[\[({](.*)[\])}]", label):
         return bracketed[1].strip(), bracketed[2].strip()
@@ -102,7 +103,7 @@ _SHAKEN = 0.7
 
 
 def guess(key: str, values: FloatArray) -> tuple[str, str]:
-    """The unit that values without one are most likely in, and why. Raises LeverError where no guess is safe."""
+    """Return the unit that values without one are most likely in, and why. Raise LeverError where no guess is safe."""
     present = values[np.isfinite(values)]
     size = float(np.percentile(np.abs(present), 99.0)) if len(present) else 0.0
     level = abs(level_in(values))
@@ -132,7 +133,7 @@ def likely(key: str, values: FloatArray) -> tuple[str, str]:
 
 
 def level_in(values: FloatArray) -> float:
-    """What a signal rests at: its median."""
+    """Return what a signal rests at: its median."""
     present = values[np.isfinite(values)]
     return float(np.median(present)) if len(present) else 0.0
 
@@ -144,7 +145,7 @@ def gravity_in(values: FloatArray) -> int:
 
 
 def check_plausible(key: str, name: str, values: FloatArray) -> None:
-    """Raises LeverError for values [SI] that no lever and no aircraft has: the unit is another one."""
+    """Raise LeverError for values [SI] that no lever and no aircraft has: the unit is another one."""
     present = values[np.isfinite(values)]
     if not len(present):
         return

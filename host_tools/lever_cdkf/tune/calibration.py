@@ -114,7 +114,7 @@ class Calibration:
 def calibrate(
     likelihood: Likelihood, assignments: Assignments, kept: Sequence[str] = (), progress: ShowProgress | None = None
 ) -> Calibration:
-    """Looks for all of NAMES that are not `kept`, in the parts of the log in which the arm does not change. With a
+    """Look for all of NAMES that are not `kept`, in the parts of the log in which the arm does not change. With a
     wrong calibration other changes are found than with the right one: it is looked for until they stay the same."""
     likelihood.leave_out_changes(assignments)
     found = _calibrate(likelihood, assignments, kept, progress)
@@ -153,7 +153,7 @@ def dither(likelihood: Likelihood) -> float:
 
 
 def _missing(likelihood: Likelihood, assignments: Assignments) -> str:
-    """Why the calibration cannot be known; empty if it can."""
+    """Return why the calibration cannot be known; empty if it can."""
     model, torque = make_config(assignments).choices["model"], dither(likelihood)
     if model != "lever":
         return f"with model {model} they cannot be known."
@@ -248,12 +248,12 @@ class _Fit:
         return self._calibrated(at, self._scores(at, now)[0], now)
 
     def _each(self, at: Array, **others: float) -> Array:
-        """Log-likelihood of each sample that is tuned on [nat]."""
+        """Return log-likelihood of each sample that is tuned on [nat]."""
         per_sample: Array = self._innovations(at, others)["log_likelihood"]
         return per_sample
 
     def _is_white(self, at: Array) -> bool:
-        """Whether the innovations are, of theta_dot or, if that is not measured, of theta."""
+        """Return whether the innovations are, of theta_dot or, if that is not measured, of theta."""
         innovations = self._innovations(at, {}, everywhere=True)
         output = 1 if innovations["sigma"][:, 1].any() else 0
         used = (innovations["sigma"][:, output] > 0.0) & self._likelihood.tuned_on
@@ -262,7 +262,7 @@ class _Fit:
         return measured is None or measured.white
 
     def _innovations(self, at: Array, others: Mapping[str, float], everywhere: bool = False) -> Array:
-        """Of the part that is tuned on, or of all."""
+        """Return the innovations of the part that is tuned on, or of all."""
         values = {each.name: each.value(float(x)) for each, x in zip(self._unknowns, at, strict=True)}
         delay = values.pop("z_ddot_delay", self._settings["z_ddot_delay"])
         everything = {**self._base, **values, **others, "z_ddot_delay": 0.0}
@@ -273,7 +273,7 @@ class _Fit:
         return innovations if everywhere else innovations[self._likelihood.tuned_on]
 
     def _scores(self, at: Array, now: Array) -> tuple[Array, Array]:
-        """Derivatives of `now`, a column for each unknown, and their sum, by differences to both sides.
+        """Return the derivative of `now`, a column for each unknown, and their sum, by differences to both sides.
 
         A difference is halfway to its other end, where the sum is less by half a step of information.
         """
@@ -301,8 +301,8 @@ class _Fit:
         return at, now, 0.0 * step
 
     def _calibrated(self, at: Array, scores: Array, now: Array) -> tuple[Calibrated, ...]:
-        """The standard deviations contain that of tau_m_gain, of which the log says nothing: as in a Schmidt-Kalman
-        filter, it is considered, not estimated."""
+        """Return the standard deviations contain that of tau_m_gain, of which the log says nothing: as in a
+        Schmidt-Kalman filter, it is considered, not estimated."""
         torque_sigma, h = self._settings[f"{TORQUE_GAIN}_sigma"], _STEPS[TORQUE_GAIN]
         covariance = np.linalg.inv(self._information(scores))
         if torque_sigma > 0.0:
@@ -325,6 +325,6 @@ class _Fit:
 
 
 def _smaller(slopes: Sequence[Array]) -> int:
-    """Which of two differences, to either side, has the smaller sum of squares: a change of the pilot that is detected
-    on one side alone would look like information."""
+    """Return which of two differences, to either side, has the smaller sum of squares: a change of the pilot that is
+    detected on one side alone would look like information."""
     return int(np.argmin([float(column @ column) for column in slopes]))

@@ -41,7 +41,7 @@ class Likelihood:
     """From when to when the estimator has reported a change of the arm [s of the recording]."""
 
     def __post_init__(self) -> None:
-        """Raises LeverError for a recording that is too short."""
+        """Raise LeverError for a recording that is too short."""
         duration = self.recording.duration + self.recording.period  # n samples last n periods
         if duration < SHORTEST - 0.5 * self.recording.period:
             raise LeverError(f"too short to tune on: {duration:.5g} s of samples; at least {SHORTEST:g} s are needed")
@@ -54,9 +54,9 @@ class Likelihood:
         """True at those that are held out."""
 
     def leave_out_changes(self, assignments: Assignments) -> bool:
-        """Tunes on those parts only in which the estimator, with these settings, finds no change of the arm. Where that
-        would leave less than half of what is tuned on, all stays: then it is not the arm that changes. Returns whether
-        other parts are tuned on than before."""
+        """Tune on those parts only in which the estimator, with these settings, finds no change of the arm. Where
+        that would leave less than half of what is tuned on, all stays: then it is not the arm that changes. Returns
+        whether other parts are tuned on than before."""
         recording, before = self.recording, self.tuned_on
         changed = self.run(noise_as_set(assignments))["changed"]
         steps = np.diff(changed.astype(np.int8), prepend=0, append=0)
@@ -77,7 +77,8 @@ class Likelihood:
         return begin, end - begin
 
     def run(self, assignments: Assignments, delay: float = 0.0) -> Array:
-        """What the estimator with these settings and choices makes of the samples: innovations.INNOVATION for each.
+        """Return what the estimator with these settings and choices makes of the samples: innovations.INNOVATION for
+        each.
 
         A `delay` of the base acceleration [s] is undone before.
         """
@@ -85,7 +86,7 @@ class Likelihood:
         return innovations(make_config(assignments), self.recording.without_delay(delay))
 
     def of(self, assignments: Assignments) -> float:
-        """Logarithm of the likelihood of the part that is tuned on; -inf where the filter breaks down."""
+        """Return logarithm of the likelihood of the part that is tuned on; -inf where the filter breaks down."""
         total = float(self.run(assignments)["log_likelihood"][self.tuned_on].sum())
         return total if np.isfinite(total) else -np.inf
 
@@ -95,5 +96,5 @@ class Likelihood:
 
 
 def noise_as_set(assignments: Assignments) -> Mapping[str, str | float]:
-    """The same settings without noise being estimated while running, which would hide what is wrong with it."""
+    """Return the same settings without noise being estimated while running, which would hide what is wrong with it."""
     return {**assignments, "noise_window": 0.0}

@@ -47,7 +47,7 @@ class Recording:
         return np.concatenate(([0.0], np.cumsum(np.where(steps > 0.0, steps, self.period))))
 
     def without_delay(self, delay: float) -> Array:
-        """The samples with the base acceleration as it is measured `delay` later [s]."""
+        """Return the samples with the base acceleration as it is measured `delay` later [s]."""
         measured = self.samples["z_ddot_valid"]
         if delay == 0.0 or not measured.any():
             return self.samples
@@ -64,8 +64,8 @@ def read(
     progress: Callable[[int, int, str], None] | None = None,
     reading: Reading | None = None,
 ) -> Recording:
-    """The samples on the bus `channel` (if not given: the one that has any) from `start` on for `length`, both [s] of
-    recorded time; with `reading`, of a log that does not speak lever.dbc. Raises LeverError."""
+    """Return the samples on the bus `channel` (if not given: the one that has any) from `start` on for `length`,
+    both [s] of recorded time; with `reading`, of a log that does not speak lever.dbc. Raise LeverError."""
     if reading is not None:
         mapped = MappedTraffic(list(map(str, paths)), reading)
         return _recording(np.concatenate(list(mapped.chunks())), str(mapped.channel), ", ".join(mapped.recording.paths))

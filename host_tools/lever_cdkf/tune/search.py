@@ -75,7 +75,7 @@ class Tuned:
 
 
 def groups(assignments: Assignments, fixed: Sequence[str] = ()) -> dict[str, tuple[str, ...]]:
-    """The settings that can be looked for, by group; not those that are `fixed`, or 0 and so switched off."""
+    """Return the settings that can be looked for, by group; not those that are `fixed`, or 0 and so switched off."""
     config = make_config(assignments)
     settings = config.settings
     candidates = {
@@ -106,7 +106,7 @@ class Search:
         return self._learnt >= LEARNT_LEAST
 
     def run(self, wanted: dict[str, tuple[str, ...]]) -> list[Tuned]:
-        """Looks for the settings in these groups; only for noise where the parameters cannot learn."""
+        """Look for the settings in these groups; only for noise where the parameters cannot learn."""
         if not self.can_learn:
             wanted = {group: names for group, names in wanted.items() if group == "noise"}
         names = [name for group in wanted.values() for name in group]
@@ -132,7 +132,7 @@ class Search:
         return math.log(max(row.least, now / _RANGE)), math.log(min(row.greatest, now * _RANGE))
 
     def _maximum(self, start: dict[str, float], names: Sequence[str]) -> dict[str, float]:
-        """The most likely logarithms of `names`, the others as in `start`."""
+        """Return the most likely logarithms of `names`, the others as in `start`."""
         top = self._at(start)
 
         def loss(x: np.ndarray) -> float:

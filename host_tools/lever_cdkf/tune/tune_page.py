@@ -30,7 +30,7 @@ def build(
     tuned: Sequence[Tuned],
     fits: Sequence[Fit],
 ) -> str:
-    """The whole page. `tables` are as they are printed; `calibration` says in words what is known of that."""
+    """Return the whole page. `tables` are as they are printed; `calibration` says in words what is known of that."""
     page = Page(_TITLE, html.escape(subtitle), "lever tune")
     calibrated, settings, numbers = (
         _table(title, tables.get(title, ())) for title in ("calibration", "settings", "before and after")
@@ -54,7 +54,7 @@ def _table(title: str, rows: Sequence[Row]) -> str:
 
 
 def _intervals(tuned: Sequence[Tuned]) -> Figure | None:
-    """A lane for each setting, over its value as a part of what it was."""
+    """Return a lane for each setting, over its value as a part of what it was."""
     if not tuned:
         return None
     names = [entry.name for entry in reversed(tuned)]
@@ -84,7 +84,8 @@ def _dot(x: float, lane: int, name: str, marker: Spec, more: Spec) -> Spec:
 
 
 def _innovations(page: Page, fits: Sequence[Fit]) -> tuple[str, ...]:
-    """Of the part that was held out, or, if none was, of the one that was tuned on; noise as set."""
+    """Return the innovations of the part that was held out, or, if none was, of the one that was tuned on; noise as
+    set."""
     part = fits[-1].part
     shown = [fit for fit in fits if fit.noise == "as set" and fit.part == part]
     return (

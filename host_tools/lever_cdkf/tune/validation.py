@@ -77,7 +77,8 @@ class Gain:
 
 
 def fits(likelihood: Likelihood, before: Assignments, after: Assignments) -> list[Fit]:
-    """Both settings, with noise as set and, if the settings have that, estimated while running, on both parts."""
+    """Return both settings, with noise as set and, if the settings have that, estimated while running, on both
+    parts."""
     ways: dict[str, Mapping[str, Mapping[str, str | float]]] = {
         "as set": {"before": noise_as_set(before), "after": noise_as_set(after)}
     }
@@ -100,7 +101,7 @@ def pairs(results: Sequence[Fit]) -> list[tuple[Fit, Fit]]:
 
 
 def gain(before: Fit, after: Fit) -> Gain:
-    """What tuning has gained on a part."""
+    """Return what tuning has gained on a part."""
     difference = after.innovations["log_likelihood"] - before.innovations["log_likelihood"]
     size = max(1, round(_BLOCK / after.period))
     blocks = difference[: len(difference) // size * size].reshape(-1, size).mean(axis=1)
@@ -109,12 +110,12 @@ def gain(before: Fit, after: Fit) -> Gain:
 
 
 def _held_out(results: Sequence[Fit]) -> dict[str, Gain]:
-    """The gain on that part, by the way to have the noise; the last is the one in flight."""
+    """Return the gain on that part, by the way to have the noise; the last is the one in flight."""
     return {before.noise: gain(before, after) for before, after in pairs(results) if before.part == "held out"}
 
 
 def is_worse(results: Sequence[Fit]) -> bool:
-    """Whether the part held out goes worse with the new settings, with noise as in flight."""
+    """Return whether the part held out goes worse with the new settings, with noise as in flight."""
     flown = list(_held_out(results).values())[-1:]
     return any(each.is_worse for each in flown)
 

@@ -20,7 +20,7 @@ class MappedLog:
     """A PlayedLog: a mapped log with the estimator's answers."""
 
     def __init__(self, path: str, reading: Reading, config: Config, aircraft: AircraftResponse | None) -> None:
-        """Reads all of it. Raises LeverError."""
+        """Read all of it. Raise LeverError."""
         self.buses = Buses()
         self._traffic = MappedTraffic([path], reading)
         self._estimator = Estimator(self._traffic.at_its_rate(config))
@@ -57,14 +57,14 @@ class MappedBusSource(BusSource):
         options: Mapping[str, Any] | None = None,
         aircraft: AircraftResponse | None = None,
     ) -> None:
-        """Opens the bus. Raises LeverError."""
+        """Open the bus. Raise LeverError."""
         self._online, self._aircraft = online, aircraft
         self._config = config
         self._estimator: Estimator | None = None
         super().__init__(interface, channel, options)
 
     def run(self) -> None:
-        """Raises LeverError when the signals are not what the mapping says."""
+        """Raise LeverError when the signals are not what the mapping says."""
         while not self._stopping.is_set():
             message = self._bus.recv(0.2)
             if message is None or message.is_error_frame or message.is_remote_frame:

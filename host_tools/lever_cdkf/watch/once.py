@@ -18,7 +18,7 @@ _LEAST_WIDTH, _PIPE_WIDTH = panels.ESTIMATES_WIDTH, 100
 
 
 def print_once(source: Source, listen: float) -> Picture:
-    """Prints one picture as plain text: after listening for `listen` seconds, or of the whole of a log."""
+    """Print one picture as plain text: after listening for `listen` seconds, or of the whole of a log."""
     picture = Picture()
     if isinstance(source, LogSource):
         source.read_into(picture)

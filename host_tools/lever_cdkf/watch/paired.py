@@ -39,7 +39,7 @@ class Paired:
         self._measured_at = -np.inf
 
     def take(self, frames: Iterable[tuple[int, bytes | bytearray]], now: float) -> None:
-        """Takes what has come."""
+        """Take what has come."""
         pairs: list[bytes] = []
         for identifier, data in frames:
             if identifier == _LEVER and len(data) == 8:
@@ -54,7 +54,7 @@ class Paired:
             self._pieces.popleft()
 
     def coherence(self, now: float) -> Measured | None:
-        """Of the last SPAN seconds, renewed each second; None while there is too little."""
+        """Return the coherence of the last SPAN seconds, renewed each second; None while there is too little."""
         if now - self._measured_at >= _REFRESH or now < self._measured_at:
             self._measured_at = now
             self._measured = self._measure()
@@ -73,7 +73,7 @@ class Paired:
 
 
 def _values(data: NDArray[np.uint8]) -> FloatArray:
-    """Time [us], z_ddot [m/s²] and theta [rad] of pairs of frames; NaN: not valid. A corrupt one has no row."""
+    """Return time [us], z_ddot [m/s²] and theta [rad] of pairs of frames; NaN: not valid. A corrupt one has no row."""
     lever, base = np.ascontiguousarray(data[:, :8]), np.ascontiguousarray(data[:, 8:])
     good = codec.check_columns("LEVER_SAMPLE", lever) & codec.check_columns("BASE_SAMPLE", base)
     of_lever, of_base = fields.columns("LEVER_SAMPLE", lever), fields.columns("BASE_SAMPLE", base)

@@ -33,7 +33,7 @@ ESTIMATES_WIDTH = sum(width + 1 for _, width in _COLUMNS)
 
 
 def headline(picture: Picture, source: Source) -> Text:
-    """What is watched, since when, and how it stands."""
+    """Return what is watched, since when, and how it stands."""
     minutes, seconds = divmod(int(picture.now), 60)
     model = f" · model {picture.model}" if picture.model else ""
     version = picture.identity.version
@@ -43,7 +43,7 @@ def headline(picture: Picture, source: Source) -> Text:
 
 
 def condition(picture: Picture, source: Source) -> Text:
-    """How it stands, in a sentence."""
+    """Return how it stands, in a sentence."""
     if source.error is not None:
         return Text(f"● {source.error}", style=_COLOURS["bad"])
     if source.ended:
@@ -53,7 +53,7 @@ def condition(picture: Picture, source: Source) -> Text:
 
 
 def estimates(picture: Picture, span: float, width: int, lines: int = 1) -> Table:
-    """Parameters and dynamics with sigma, and how they went in the last `span` seconds; `width` [characters].
+    """Return parameters and dynamics with sigma, and how they went in the last `span` seconds; `width` [characters].
 
     With more than one of the `lines` each, the range of a chart stands beside it.
     """
@@ -104,7 +104,7 @@ def feedthrough(picture: Picture, width: int) -> Table:
 
 
 def _grid(widths: Sequence[int], head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """Columns of figures; the first one names the rows."""
+    """Return columns of figures; the first one names the rows."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
     for column, width in enumerate(widths):
         table.add_column(justify="right" if column else "left", width=width, no_wrap=True)
@@ -115,7 +115,8 @@ def _grid(widths: Sequence[int], head: Sequence[str], rows: Sequence[Sequence[st
 
 
 def _lag(response: complex) -> float:
-    """The phase [deg] as the page has it, from -360 to 0: a lever lags the floor, or starts against it at -180."""
+    """Return the phase [deg] as the page has it, from -360 to 0: a lever lags the floor, or starts against it at
+    -180."""
     return -(-math.degrees(cmath.phase(response)) % 360.0)
 
 
@@ -124,7 +125,7 @@ def _at(measured: Measured | None, frequency: float) -> float:
 
 
 def sparkline(values: Sequence[float], least_range: float, width: int, lines: int = 1) -> str:
-    """The values as bars of so many lines, oldest left, from the bottom to the top of _scale()."""
+    """Return the values as bars of so many lines, oldest left, from the bottom to the top of _scale()."""
     chosen = [values[min(len(values) - 1, int((k + 0.5) * len(values) / width))] for k in range(width) if values]
     bottom, top = _scale(chosen, least_range)
     if math.isnan(bottom):
@@ -188,7 +189,7 @@ def health(picture: Picture, source: Source) -> Table:
 
 
 def messages(picture: Picture) -> Table:
-    """Rates and losses of each message that has come."""
+    """Return rates and losses of each message that has come."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(no_wrap=True)
     for _ in range(4):

@@ -104,7 +104,7 @@ class Picture:
         """What the estimator and its machine have counted since then."""
 
     def take(self, frames: Iterable[Frame], now: float) -> None:
-        """Takes what has come since the last call; also to be called when that is nothing."""
+        """Take what has come since the last call; also to be called when that is nothing."""
         self.now = now
         groups: dict[int, list[bytes | bytearray]] = {}
         frames = list(frames)
@@ -142,11 +142,12 @@ class Picture:
         return min(self.age(entry.name) for entry in self.traffic.values() if entry.sender == "ESTIMATOR")
 
     def field(self, message: str, name: str) -> float:
-        """The last value of a field; NaN when there is none or it is too old."""
+        """Return the last value of a field; NaN when there is none or it is too old."""
         return self.values[message][name] if self.is_fresh(message) and message in self.values else NAN
 
     def wrong_contract(self) -> str | None:
-        """Why what is shown may be misread: the estimator speaks another version of lever.dbc, or an unknown one."""
+        """Return why what is shown may be misread: the estimator speaks another version of lever.dbc, or an unknown
+        one."""
         contract = self.identity.contract
         if contract is not None:
             mismatch = f"contract {contract} of lever.dbc, this program {codec.contract()}: what is shown is wrong"
@@ -156,7 +157,7 @@ class Picture:
         return "the estimator does not send its version (IDENTITY): if it is an old one, what is shown is wrong"
 
     def parameters(self) -> list[Estimated]:
-        """The parameters of the model; none before it is known."""
+        """Return the parameters of the model; none before it is known."""
         if self.model is None:
             return []
         value, sigma = "PILOT_PARAMETERS", "PILOT_SIGMA"
@@ -166,7 +167,7 @@ class Picture:
         ]
 
     def dynamics(self) -> list[Estimated]:
-        """Natural frequency and damping ratio."""
+        """Return natural frequency and damping ratio."""
         name = "PILOT_DYNAMICS"
         return [Estimated(key, unit, self.field(name, key), self.field(name, f"{key}_sigma")) for key, unit in DYNAMICS]
 
@@ -190,19 +191,19 @@ class Picture:
         return None if math.isnan(raw) else enum_names("lever_mode").get(int(raw), f"mode {int(raw)}")
 
     def faults(self) -> list[str]:
-        """Names of enum lever_fault that were seen lately."""
+        """Return names of enum lever_fault that were seen lately."""
         return _recent(self._faults, self.now) if self.is_fresh("HEALTH") else []
 
     def platform_faults(self) -> list[str] | None:
-        """Names of enum lever_platform_fault that were seen lately; None when the machine reports nothing."""
+        """Return names of enum lever_platform_fault that were seen lately; None when the machine reports nothing."""
         return _recent(self._platform_faults, self.now) if self.is_fresh("PLATFORM_HEALTH") else None
 
     def nis(self) -> float:
-        """Mean normalised innovation squared [1]."""
+        """Return mean normalised innovation squared [1]."""
         return self._windows["nis"].mean(self.now)
 
     def theta(self) -> float:
-        """Mean lever angle [rad], about which the arm moves."""
+        """Return mean lever angle [rad], about which the arm moves."""
         return self._windows["theta"].mean(self.now)
 
     def dither(self) -> float:

@@ -71,7 +71,7 @@ class _Throttle:
         self._times: deque[float] = deque(maxlen=most)  # [s]
 
     def count(self, now: float) -> None:
-        """One more. Raises LeverError."""
+        """One more. Raise LeverError."""
         most = self._times.maxlen
         if len(self._times) == most and now - self._times[0] < 1.0:
             raise LeverError(f"{self._whose} may send {most} commands a second: wait a moment")
@@ -82,7 +82,7 @@ class Server:
     """The page of a source at a port of the address `host`."""
 
     def __init__(self, source: Source, config: Config, *, host: str, port: int, read_only: bool) -> None:
-        """Takes the port. Raises LeverError."""
+        """Take the port. Raise LeverError."""
         self.source, self.config, self.host = source, config, host
         self.state = State(source, config, read_only=read_only)
         self._sender = ThreadPoolExecutor(1, "lever commands")
@@ -99,7 +99,7 @@ class Server:
         return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/"
 
     async def run(self, stop: asyncio.Event) -> None:
-        """Serves until `stop` is set."""
+        """Serve until `stop` is set."""
         application = tornado.web.Application(
             [(r"/socket", Channel, {"server": self}), (r"/(.*)", Page, {"server": self})],
             log_function=lambda _handler: None,
@@ -123,7 +123,7 @@ class Server:
             self.source.stop()
 
     def advance(self) -> None:
-        """Tells all pages what is new. Dither goes on as long as there is a page that shows it."""
+        """Tell all pages what is new. Dither goes on as long as there is a page that shows it."""
         messages = self.state.advance()
         if self._upkeep is None or self._upkeep.done():
             self._upkeep = self._in_turn(partial(self._keep_dither, bool(self.pages)))
@@ -131,11 +131,11 @@ class Server:
             page.update(messages)
 
     async def command(self, command: Mapping[str, str | float]) -> None:
-        """Sends a COMMAND. Raises LeverError."""
+        """Send a COMMAND. Raise LeverError."""
         await self._in_turn(partial(self.source.command, command))
 
     def _in_turn(self, send: Callable[[], None]) -> asyncio.Future[None]:
-        """Sends in a thread, where a bus that is full is waited for: the pages are not."""
+        """Send in a thread, where a bus that is full is waited for: the pages are not."""
         return asyncio.get_running_loop().run_in_executor(self._sender, send)
 
     def _keep_dither(self, is_shown: bool) -> None:
@@ -146,7 +146,7 @@ class Server:
                 self.source.end_dither()
 
     def is_host(self, header: str) -> bool:
-        """Whether the Host header names this server; a port may be another one, because of tunnels."""
+        """Return whether the Host header names this server; a port may be another one, because of tunnels."""
         try:
             name = urlsplit(f"//{header}").hostname or ""
         except ValueError:
@@ -219,7 +219,7 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
         self.server.pages.discard(self)
 
     def update(self, messages: list[str]) -> None:
-        """Sends what is new. A page that is slow misses it, so that nothing piles up here, and then starts anew."""
+        """Send what is new. A page that is slow misses it, so that nothing piles up here, and then starts anew."""
         if self._sending is not None and not self._sending.done():
             self._behind += 1
             if self._behind > _MOST_BEHIND:
@@ -241,7 +241,7 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
             self.server.pages.discard(self)
 
     async def on_message(self, message: str | bytes) -> None:
-        """The next one is not read before this one is answered."""
+        """Answer a message before the next one is read."""
         try:
             if not self.server.state.controls:
                 raise LeverError("this page is read-only: no commands")
@@ -258,7 +258,7 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
 def serve(
     source: Source, config: Config, *, host: str, port: int, read_only: bool, duration: float | None = None
 ) -> None:
-    """Serves the page until Ctrl-C, or for `duration` [s]. Raises LeverError."""
+    """Serve the page until Ctrl-C, or for `duration` [s]. Raise LeverError."""
     try:
         server = Server(source, config, host=host, port=port, read_only=read_only)
     except LeverError:
@@ -276,7 +276,7 @@ def serve(
 
 
 async def _until_stopped(server: Server, duration: float | None) -> bool:
-    """Runs the server; returns whether a signal has ended it."""
+    """Run the server; return whether a signal has ended it."""
     stop, loop, interrupted = asyncio.Event(), asyncio.get_running_loop(), []
 
     def end() -> None:

@@ -45,7 +45,7 @@ SIMULATIONS = "lever_cdkf.simulations"
 
 
 def _dithers(values: Mapping[str, codec.Value]) -> bool | None:
-    """Whether a COMMAND asks for dither; None where it says nothing of it."""
+    """Return whether a COMMAND asks for dither; None where it says nothing of it."""
     rms = values.get("dither_rms")
     return rms > 0.0 if isinstance(rms, int | float) else None
 
@@ -84,7 +84,7 @@ class Source(ABC):
 
     @abstractmethod
     def run(self) -> None:
-        """Puts frames until self._stopping is set or none are left. Raises what went wrong."""
+        """Put frames until self._stopping is set or none are left. Raises what went wrong."""
 
     def start(self) -> None:
         self._switch_interval = sys.getswitchinterval()
@@ -93,7 +93,7 @@ class Source(ABC):
         self._thread.start()
 
     def stop(self) -> None:
-        """Ends the thread and releases what it used; may be called again."""
+        """End the thread and release what it used; may be called again."""
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join(timeout=3.0)
@@ -107,12 +107,12 @@ class Source(ABC):
         return time.monotonic() - self._start
 
     def drain(self) -> list[Frame]:
-        """The frames that have come since the last call."""
+        """Return the frames that have come since the last call."""
         return [self._waiting.popleft() for _ in range(len(self._waiting))]
 
     def command(self, values: Mapping[str, codec.Value]) -> None:
-        """Sends a COMMAND: the fields of the message, and of the ones before as far as they are not acknowledged; those
-        not given change nothing. Raises LeverError."""
+        """Send a COMMAND: the fields of the message, and of the ones before as far as they are not acknowledged;
+        those not given change nothing. Raise LeverError."""
         if not self.takes_commands:
             raise LeverError(f"{self.title} takes no commands")
         self._pending, self._why_not = {**self._pending, **values}, UNANSWERED
@@ -120,8 +120,8 @@ class Source(ABC):
         self._tries = [self._send(self._pending)]
 
     def acknowledged(self, ack: Mapping[str, float]) -> None:
-        """Takes the fields of a COMMAND_ACK. What is out of sequence is not refused for good: the last sender may have
-        stopped at this counter, or a moment ago."""
+        """Take the fields of a COMMAND_ACK. What is out of sequence is not refused for good: the last sender may
+        have stopped at this counter, or a moment ago."""
         result = result_of(ack)
         own = bool(self._pending) and int(ack["command_counter"]) in self._tries
         if own and result == SEQUENCE:
@@ -135,7 +135,7 @@ class Source(ABC):
             self._pending = {}
 
     def keep_alive(self) -> None:
-        """Repeats a COMMAND when it is time: one that is not acknowledged, or any, so that dither asked for here goes
+        """Repeat a COMMAND when it is time: one that is not acknowledged, or any, so that dither asked for here goes
         on. To be called several times a second as long as somebody watches it."""
         if time.monotonic() - self._commanded < KEEP_ALIVE:
             return
@@ -149,22 +149,22 @@ class Source(ABC):
             self.refusals.append(self._why_not)
 
     def end_dither(self) -> None:
-        """Ends the dither asked for here, if there is any."""
+        """End the dither that was asked for here, if there is any."""
         if self._dithers or _dithers(self._pending):
             self.command({"dither_rms": 0.0})
 
     def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
-        """What is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈ [rad/(m/s²)] at
-        the frequencies [Hz]. None where that is not known."""
+        """Return what is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈
+        [rad/(m/s²)] at the frequencies [Hz]. None where that is not known."""
         return None
 
     def _send(self, values: Mapping[str, codec.Value]) -> int:
-        """Returns its counter."""
+        """Return its counter."""
         self._commanded = time.monotonic()
         return self._commander.send(values, self._transmit)
 
     def _transmit(self, identifier: int, data: bytes) -> None:
-        """Sends a frame, where commands are taken. Raises LeverError."""
+        """Send a frame, where commands are taken. Raise LeverError."""
         raise NotImplementedError
 
     def _put(self, frame: Frame) -> None:
@@ -187,7 +187,7 @@ class BusSource(Source):
     takes_commands = True
 
     def __init__(self, interface: str, channel: str | None, options: Mapping[str, Any] | None = None) -> None:
-        """Opens the bus. Raises LeverError."""
+        """Open the bus. Raise LeverError."""
         super().__init__()
         self.title = interface if channel is None else f"{interface} {channel}"
         self._bus = open_bus(interface, channel, options or {})
@@ -205,8 +205,8 @@ class BusSource(Source):
         self._bus.shutdown()
 
     def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
-        """What is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈ [rad/(m/s²)] at
-        the frequencies [Hz]. None where that is not known."""
+        """Return what is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈
+        [rad/(m/s²)] at the frequencies [Hz]. None where that is not known."""
         return None
 
     def _transmit(self, identifier: int, data: bytes) -> None:
@@ -239,7 +239,7 @@ class LogSource(Source):
         log: PlayedLog | None = None,
         part: tuple[float, float] = (0.0, float("inf")),
     ) -> None:
-        """Opens the log, unless `log` is it; of it `part` is played: start and length [s]. Raises LeverError."""
+        """Open the log, unless `log` is it; of it `part` is played: start and length [s]. Raise LeverError."""
         from ..can.logs import Recording
 
         super().__init__()
@@ -258,7 +258,7 @@ class LogSource(Source):
             self._put(frame)
 
     def read_into(self, picture: Picture) -> None:
-        """The whole log at once, as if it had been played to its end. Raises LeverError."""
+        """Read the whole log at once, as if it had been played to its end. Raise LeverError."""
         now, due, batch = 0.0, STEP, list[Frame]()
         for pause, frame in self._frames():
             now += pause
@@ -269,7 +269,8 @@ class LogSource(Source):
         picture.take(batch, now)
 
     def _frames(self) -> Iterator[tuple[float, Frame]]:
-        """Each frame with the time after the one before it [s]; a clock that went back or jumped far counts as 0."""
+        """Yield each frame with the time after the one before it [s]; a clock that went back or jumped far counts as
+        0."""
         from ..can.bulk import ERROR as ERROR_FRAME
 
         last: int | None = None
@@ -301,7 +302,7 @@ class LogSource(Source):
 
 
 def _widen(bus: can.BusABC) -> None:
-    """Asks for as large a receive buffer as the kernel gives, where the bus has a socket: for when others run."""
+    """Ask for as large a receive buffer as the kernel gives, where the bus has a socket: for when others run."""
     own = getattr(bus, "socket", None)
     if isinstance(own, socket.socket):
         with suppress(OSError):
@@ -309,7 +310,7 @@ def _widen(bus: can.BusABC) -> None:
 
 
 def as_frame(message: can.Message) -> Frame:
-    """What a view needs of a python-can message."""
+    """Return what a view needs of a python-can message."""
     if message.is_error_frame:
         return ERROR, b""
     if message.is_extended_id or message.is_remote_frame or message.is_fd:
@@ -318,7 +319,7 @@ def as_frame(message: can.Message) -> Frame:
 
 
 def simulated(scenario: str) -> tuple[Source, Config]:
-    """The pilot of a scenario in real time, by the name or the path of the scenario. Raises LeverError."""
+    """Return the pilot of a scenario in real time, by the name or the path of the scenario. Raise LeverError."""
     for entry in importlib.metadata.entry_points(group=SIMULATIONS):
         open_source: Callable[[str], tuple[Source, Config]] = entry.load()
         return open_source(scenario)

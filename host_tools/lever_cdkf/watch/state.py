@@ -48,7 +48,7 @@ class State:
         self._model: str | None = None
 
     def advance(self) -> list[str]:
-        """Takes what has come; the messages to send: an update, and before it the start, if the model has changed."""
+        """Take what has come; the messages to send: an update, and before it the start, if the model has changed."""
         picture, source = self.picture, self._source
         picture.take(source.drain(), source.now)
         while picture.acknowledgements:
@@ -74,7 +74,7 @@ class State:
         return [*messages, _json({"update": update})]
 
     def start(self) -> str:
-        """What a page is told first."""
+        """Return what a page is told first."""
         start = {
             "title": self._source.title,
             "simulated": self._source.simulated,
@@ -127,7 +127,7 @@ class State:
         return {"values": values, "chance": measured.chance}
 
     def _present(self) -> dict[str, Any]:
-        """How it stands."""
+        """Return how it stands."""
         picture, source = self.picture, self._source
         level, text = status.condition(picture)
         if source.error is not None:
@@ -184,7 +184,7 @@ def _json(content: dict[str, Any]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Numbers with a few digits, null for what is not a number."""
+    """Return numbers with a few digits, null for what is not a number."""
     if isinstance(value, dict):
         return {key: _plain(each) for key, each in value.items()}
     if isinstance(value, str) or value is None or isinstance(value, bool | int):
@@ -210,7 +210,7 @@ def greatest_dither(config: Config) -> float:
 
 
 def command_of(content: Any, config: Config) -> dict[str, str | float]:
-    """The fields of COMMAND that a page asks for. Raises ValueError with what is wrong."""
+    """Return the fields of COMMAND that a page asks for. Raise ValueError with what is wrong."""
     allowed = {what: list(enum_names(f"lever_{what}").values()) for what in ("request", "model", "estimator")}
     if not isinstance(content, dict) or not content:
         raise ValueError("a command is an object of request, model, estimator, dither_rms")

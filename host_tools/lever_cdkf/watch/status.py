@@ -16,7 +16,7 @@ SILENT_AFTER = 1.0
 
 
 def condition(picture: Picture) -> tuple[str, str]:
-    """The state of the estimator in one line: ("good", "watch" or "bad", text)."""
+    """Return the state of the estimator in one line: ("good", "watch" or "bad", text)."""
     silence = picture.silence()
     if silence > SILENT_AFTER:
         if silence != float("inf"):
@@ -41,7 +41,7 @@ def condition(picture: Picture) -> tuple[str, str]:
 
 
 def bounce(picture: Picture) -> tuple[str, str] | None:
-    """How near collective bounce is, as condition(); None from an estimator that does not know the aircraft."""
+    """Return how near collective bounce is, as condition(); None from an estimator that does not know the aircraft."""
     state = picture.field("STABILITY", "bounce")
     if math.isnan(state):
         return None
@@ -57,7 +57,7 @@ def bounce(picture: Picture) -> tuple[str, str] | None:
 
 
 def last_reset(picture: Picture) -> str | None:
-    """What made the machine start last, and what its self tests have found since; None if it does not say."""
+    """Return what made the machine start last, and what its self tests have found since; None if it does not say."""
     if not picture.is_fresh("PLATFORM_RESET"):
         return None
     names = ("cause", "resets", "failed", "fault_address")
@@ -72,7 +72,7 @@ def last_reset(picture: Picture) -> str | None:
 
 
 def faults(picture: Picture) -> list[str]:
-    """The faults of the estimator and its machine, in words."""
+    """Return the faults of the estimator and its machine, in words."""
     machine = picture.platform_faults()
     named = [name for name in picture.faults() if not (machine and name == "platform")]
     texts = [enum_words("lever_fault")[name] for name in named]

@@ -84,7 +84,7 @@ class Monitor(App[None]):
         self.source.stop()
 
     def advance(self) -> None:
-        """Takes what has come, also while the picture is held, and shows it."""
+        """Take the frames that have come, also while the picture is held, and show them."""
         self.picture.take(self.source.drain(), self.source.now)
         if not self.held:
             self.draw()
@@ -104,17 +104,17 @@ class Monitor(App[None]):
         tables["messages"].update(messages)
 
     def action_hold(self) -> None:
-        """Stops or goes on redrawing; frames are counted meanwhile."""
+        """Stop or resume redrawing; frames are counted meanwhile."""
         self.held = not self.held
         self._panels["estimates"].border_title = "estimates (held: space goes on)" if self.held else "estimates"
 
     def action_feedthrough(self) -> None:
-        """Shows the feedthrough, or not; before the first time the height of the terminal decides."""
+        """Show the feedthrough, or not; before the first time the height of the terminal decides."""
         self._feedthrough_chosen = True
         self._panels["feedthrough"].display = not self._panels["feedthrough"].display
 
     def action_span(self) -> None:
-        """The next span of SPANS."""
+        """Show the next span of SPANS."""
         self.span = SPANS[(SPANS.index(self.span) + 1) % len(SPANS)]
         self.draw()
 

@@ -43,8 +43,8 @@ class Geometry:
     def response(
         self, model: str, parameters: Sequence[float], trim: float, sent: Sequence[Feedthrough]
     ) -> Response | None:
-        """The response of `model` with its parameters about the trim angle [rad]; None if any is not known. The band is
-        that of FEEDTHROUGH, a value a frequency of it, and between those by straight lines."""
+        """Return the response of `model` with its parameters about the trim angle [rad]; None if any is not known.
+        The band is that of FEEDTHROUGH, a value a frequency of it, and between those by straight lines."""
         if not np.isfinite([*parameters, trim]).all():
             return None
         transfer = bode.transfer(model, self._lever, np.array(parameters)[:, np.newaxis], np.array([trim]))

@@ -93,7 +93,8 @@ class Aircraft(ABC):
 
     @abstractmethod
     def mounted(self) -> StateSpace:
-        """The airframe: inputs theta_c [rad] and gust [m/s^2], outputs z_ddot at the seat and at the accelerometer."""
+        """Return the airframe: inputs theta_c [rad] and gust [m/s^2], outputs z_ddot at the seat and at the
+        accelerometer."""
 
     @property
     def has_actuator(self) -> bool:
@@ -101,7 +102,7 @@ class Aircraft(ABC):
         return True
 
     def airframe(self) -> StateSpace:
-        """The same, with the accelerometer where it is to sit."""
+        """Return the same, with the accelerometer where it is to sit."""
         airframe = self.mounted()
         if self.accelerometer == "mounted":
             return airframe
@@ -202,8 +203,8 @@ class Imported(FromFile):
         return self.input == "blade"
 
     def picked(self, whole_system: StateSpace, where: str) -> StateSpace:
-        """Two inputs and two outputs of all that a file has. Without a gust there, it accelerates both places alike.
-        Raises LeverError."""
+        """Return two inputs and two outputs of all that a file has. Without a gust there, it accelerates both places
+        alike. Raise LeverError."""
         inputs = _chosen(
             (self.collective_input, self.gust_input), whole_system.d.shape[1], ("collective", "gust"), where
         )
@@ -252,8 +253,8 @@ FILES = (".mat", ".npz", ".csv")
 
 
 def load(name_or_path: str, **changes: Any) -> Aircraft:
-    """The aircraft of that name, or in the file of that path (ending in .toml, .mat, .npz or .csv), with some of its
-    keys changed: values as they stand in a .toml file. Raises LeverError."""
+    """Return the aircraft of that name, or in the file of that path (ending in .toml, .mat, .npz or .csv), with some
+    of its keys changed: values as they stand in a .toml file. Raise LeverError."""
     path, place = Path(name_or_path), Place(name_or_path)
     if path.suffix.lower() not in FILES:
         values = parse(SHELF.content(name_or_path), name_or_path)
@@ -279,7 +280,7 @@ _OF_SCENARIO = ("model", "gearing")
 
 
 def keys(model: str) -> list[str]:
-    """What may be said of the aircraft of that name or file."""
+    """Return what may be said of the aircraft of that name or file."""
     path = Path(model)
     kind: type[Aircraft] = Helicopter
     if path.suffix.lower() in FILES:

@@ -65,7 +65,7 @@ class Flight:
         return seat, sensor
 
     def _delayed(self, time: float) -> float:
-        """The corrected angle of the lever at `time` [samples], which is past; 0 before the start."""
+        """Return the corrected angle of the lever at `time` [samples], which is past; 0 before the start."""
         if time < 0.0:
             return 0.0
         whole = int(time)
@@ -114,7 +114,7 @@ class Constants:
 
 
 def dot(row: Sequence[float], values: Sequence[float]) -> float:
-    """The inner product, summed in order, as C does."""
+    """Return the inner product, summed in order, as C does."""
     total = 0.0
     for factor, value in zip(row, values, strict=True):
         total += factor * value
@@ -127,8 +127,9 @@ def limited(value: float, most: float) -> float:
 
 
 def first_order_hold(a: FloatArray, b: FloatArray, step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Matrices of x and of the input at both ends of a step [s], over which the input is linear: the exponential of
-    [[A, B, 0], [0, 0, 1/step], [0, 0, 0]] (van Loan 1978), by its series of a part of the step, squared."""
+    """Return matrices of x and of the input at both ends of a step [s], over which the input is linear: the
+    exponential of [[A, B, 0], [0, 0, 1/step], [0, 0, 0]] (van Loan 1978), by its series of a part of the step,
+    squared."""
     n, m = b.shape
     whole = np.zeros((n + 2 * m, n + 2 * m))
     whole[:n, :n], whole[:n, n : n + m] = a, b

@@ -48,7 +48,7 @@ class Margins:
 
 
 def margins(loop: Response, band: tuple[float, float] = BAND) -> Margins:
-    """The margins of L in a band [Hz]."""
+    """Return the margins of L in a band [Hz]."""
     frequency = np.geomspace(*band, _POINTS)
     response = loop(_on_axis(frequency))
     crossing, height = _crossings(loop, frequency, response)
@@ -100,7 +100,8 @@ def _crossings(loop: Response, frequency: FloatArray, response: ComplexArray) ->
 
 
 def mode(loop: Response, guess: complex) -> complex:
-    """The root s [rad/s] of 1 - L(s) near `guess`, by Newton's method: Re s is the growth rate, Im s the frequency."""
+    """Return the root s [rad/s] of 1 - L(s) near `guess`, by Newton's method: Re s is the growth rate, Im s the
+    frequency."""
     s = guess
     for _ in range(50):
         step = 1e-6 * (1.0 + abs(s))

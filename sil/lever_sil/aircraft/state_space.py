@@ -43,7 +43,7 @@ class StateSpace:
     d: FloatArray
 
     def response(self, s: ComplexArray, output: int, given: int) -> ComplexArray:
-        """Of an output to an input at the complex frequencies s [rad/s]."""
+        """Return the response of an output to an input at the complex frequencies s [rad/s]."""
         identity = np.eye(len(self.a))
         state = np.linalg.solve(s[:, None, None] * identity - self.a, self.b[:, [given]].astype(np.complex128))
         response: ComplexArray = (self.c[[output]] @ state)[:, 0, 0] + self.d[output, given]
@@ -112,7 +112,7 @@ def _save(kind: str, file: Any, arrays: Mapping[str, FloatArray]) -> None:
 
 
 def _krylov(a: FloatArray, b: FloatArray) -> FloatArray:
-    """An orthonormal basis of what b, A b, A^2 b, ... span."""
+    """Return an orthonormal basis of what b, A b, A^2 b, ... span."""
     size = max(float(np.abs(a).max(initial=0.0)), 1e-300)
     basis, new = np.zeros((len(a), 0)), b / np.maximum(np.linalg.norm(b, axis=0), 1e-300)
     while new.shape[1]:
@@ -129,7 +129,7 @@ def _krylov(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def read(path: Path) -> StateSpace:
-    """What a file holds, as it stands: real and finite. Raises LeverError."""
+    """Return what a file holds, as it stands: real and finite. Raise LeverError."""
     if not path.is_file():
         raise LeverError(f"{path}: no such file")
     try:
@@ -202,7 +202,7 @@ def _csv(path: Path) -> Mapping[str, Any]:
 
 
 def is_state_space(line: str) -> bool:
-    """Whether a .csv file that begins with this line is one, not a frequency response."""
+    """Return whether a .csv file that begins with this line is one, not a frequency response."""
     return line.lower().startswith("states")
 
 
@@ -210,8 +210,8 @@ _READERS = {".mat": _mat, ".npz": _npz, ".csv": _csv}
 
 
 def flyable(system: StateSpace, where: str) -> StateSpace:
-    """An airframe of two inputs and two outputs, balanced and minimal. Raises LeverError where it is unstable, or of
-    another scale than a helicopter."""
+    """Return an airframe of two inputs and two outputs, balanced and minimal. Raise LeverError where it is
+    unstable, or of another scale than a helicopter."""
     system = system.balanced().minimal()
     poles = system.poles()
     worst = poles[np.argmax(poles.real)] if len(poles) else complex(-1.0)

@@ -35,7 +35,7 @@ class Tabulated:
 
     @classmethod
     def load(cls, path: str | Path) -> Tabulated:
-        """From a file. Raises LeverError."""
+        """From a file. Raise LeverError."""
         try:
             lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
         except (OSError, UnicodeError) as error:
@@ -62,8 +62,8 @@ class Tabulated:
         return cls(columns[0], columns[1] + 1j * columns[2], seat)
 
     def fitted(self, gearing: float, delay: float) -> tuple[StateSpace, float]:
-        """A state space of pitch and gust to seat and accelerometer, both of which a gust accelerates, without gearing
-        [1] and delay [s], which are in the table; and its largest relative error [1]."""
+        """Return a state space of pitch and gust to seat and accelerometer, both of which a gust accelerates,
+        without gearing [1] and delay [s], which are in the table; and its largest relative error [1]."""
         s = 2j * np.pi * self.frequency.astype(np.complex128)
         values = self.values * np.exp(s * delay) / gearing
         fits = tuple(fit(s, each) for each in ((values,) if self.seat is None else (values, values / self.seat)))
@@ -95,7 +95,7 @@ class Tabulated:
 
 
 def is_response(path: Path) -> bool:
-    """Whether a file is to hold a frequency response, not a state space."""
+    """Return whether a file is to hold a frequency response, not a state space."""
     if path.suffix.lower() != ".csv" or not path.is_file():
         return path.suffix.lower() == ".csv"
     lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()

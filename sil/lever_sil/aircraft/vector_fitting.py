@@ -33,8 +33,8 @@ class Fit:
 
 
 def fit(s: ComplexArray, values: ComplexArray, most_pairs: int = MOST_PAIRS, good: float = GOOD) -> Fit:
-    """The fit with the fewest pairs of poles that is good at every frequency, or the best; s [rad/s] on the imaginary
-    axis."""
+    """Return the fit with the fewest pairs of poles that is good at every frequency, or the best; s [rad/s] on the
+    imaginary axis."""
     most = max(1, min(most_pairs, (len(s) - 1) // 2))
     found: Fit | None = None
     for pairs in range(1, most + 1):
@@ -75,13 +75,13 @@ def _least_squares(matrix: ComplexArray, right: ComplexArray) -> FloatArray:
 
 
 def _stable_pairs(poles: ComplexArray) -> ComplexArray:
-    """One of each complex pair, and real poles by themselves, mirrored into the left half-plane."""
+    """Return one of each complex pair, and real poles by themselves, mirrored into the left half-plane."""
     stable = -np.abs(poles.real) - 1e-9 * np.abs(poles) + 1j * poles.imag
     return stable[poles.imag >= 0.0]
 
 
 def _blocks(poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """A and b in real form of the poles, of which complex ones stand for their pair."""
+    """Return a and b in real form of the poles, of which complex ones stand for their pair."""
     size = int(np.sum(np.where(poles.imag > 0.0, 2, 1)))
     a, b, at = np.zeros((size, size)), np.zeros(size), 0
     for pole in poles:
@@ -96,7 +96,7 @@ def _blocks(poles: ComplexArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _basis(a: FloatArray, b: FloatArray, s: ComplexArray) -> ComplexArray:
-    """(s - A)^-1 b at each s: (points, states)."""
+    """Return (s - A)^-1 b at each s: (points, states)."""
     right = np.broadcast_to(b[:, None], (len(s), len(a), 1)).astype(np.complex128)
     basis: ComplexArray = np.linalg.solve(s[:, None, None] * np.eye(len(a)) - a, right)[:, :, 0].astype(np.complex128)
     return basis

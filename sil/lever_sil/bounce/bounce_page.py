@@ -18,7 +18,7 @@ _MOST = 15.0  # [dB]
 
 
 def build(results: Sequence[Result], seeds: int) -> str:
-    """The whole page."""
+    """Return the whole page."""
     page = Page(
         "Collective bounce: seen coming, and how far it is held off",
         f"{seeds} random pilots with each of {len(AIRCRAFT)} aircraft, or with {len(FIVE)} in turn where it is about "
@@ -36,7 +36,8 @@ def build(results: Sequence[Result], seeds: int) -> str:
 
 
 def _chart(shown: Excerpt, flight: str) -> Figure:
-    """The margin with the limits of warning and alarm, what the lever does, what the cabin does, and when what came."""
+    """Return the margin with the limits of warning and alarm, what the lever does, what the cabin does, and when
+    what came."""
     rows = [axis("margin [dB]", range=[-5.0, _MOST], weight=1.5), axis("lever [°]"), axis("cabin [m/s²]")]
     figure = Figure(rows, time_axis(float(shown.time[-1])), height=480)
     margin = np.minimum(shown.margin, _MOST)

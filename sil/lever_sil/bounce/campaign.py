@@ -41,12 +41,13 @@ class Task(NamedTuple):
 
 
 def measure(task: Task) -> Measured:
-    """Flies it. Raises LeverError."""
+    """Fly it. Raise LeverError."""
     return CONDITIONS[task.condition].measure(task.craft, task.seed)
 
 
 def run(rows: Sequence[Condition], seeds: int, show: Show) -> list[Result]:
-    """The results of the rows, in their order, with so many pilots. Rows that measure the same share the flights."""
+    """Return the results of the rows, in their order, with so many pilots. Rows that measure the same share the
+    flights."""
     flown = {row.measure: row for row in reversed(rows)}
     tasks = [Task(row.name, *flight) for row in flown.values() for flight in _flights(row, seeds)]
     found = iter(in_processes(measure, tasks, os.cpu_count() or 1, show))
@@ -55,7 +56,7 @@ def run(rows: Sequence[Condition], seeds: int, show: Show) -> list[Result]:
 
 
 def _flights(row: Condition, seeds: int) -> list[tuple[str, int]]:
-    """Each pilot with each aircraft, or with one of them in turn."""
+    """Return each pilot with each aircraft, or with one of them in turn."""
     if row.in_turn:
         return [(row.aircraft[seed % len(row.aircraft)], seed) for seed in range(seeds)]
     return [(craft, seed) for craft in row.aircraft for seed in range(seeds)]

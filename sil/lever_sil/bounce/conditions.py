@@ -185,8 +185,8 @@ def _more(**tables: Any) -> Callable[[Plan], Plan]:
 
 
 def _stuck_with(name: str, factor: float) -> Callable[[Plan], Plan]:
-    """The firmware takes a parameter for so many times what it is, and the others for what they are, and learns
-    nothing."""
+    """Let the firmware take a parameter for so many times what it is, and the others for what they are, and
+    learns nothing."""
 
     def spoil(plan: Plan) -> Plan:
         arm = pilots.arm(plan.seed, pilots.SLACK)
@@ -303,7 +303,7 @@ def _airframe(**keys: Any) -> Callable[[Plan], Plan]:
 
 
 def _late(milliseconds: float, told: bool = False) -> Callable[[Plan], Plan]:
-    """The correction; at most 20 ms can be told."""
+    """Return the correction; at most 20 ms can be told."""
 
     def spoil(plan: Plan) -> Plan:
         seconds = 1e-3 * milliseconds
@@ -318,7 +318,7 @@ def _base_late(milliseconds: float) -> Callable[[Plan], Plan]:
 
 
 def _softening(plan: Plan) -> Plan:
-    """The grip loses 40 % of its stiffness at 45 s."""
+    """Return the grip loses 40 % of its stiffness at 45 s."""
     k_p = pilots.arm(plan.seed, pilots.SLACK)["k_p"]
     ramp = {"kind": "ramp", "first": f"{k_p} N/m", "last": f"{0.6 * k_p} N/m", "start": "45 s", "duration": "0.05 s"}
     return replace(plan, pilot={**plan.pilot, "k_p": ramp})

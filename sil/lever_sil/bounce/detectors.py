@@ -46,7 +46,7 @@ class Watched:
 
     @classmethod
     def of(cls, theta: FloatArray, z_ddot: FloatArray, period: float) -> Watched:
-        """Means over a sample period of theirs, of signals so many seconds apart."""
+        """Return means over a sample period of theirs, of signals so many seconds apart."""
         step = round(1.0 / (RATE * period))
         count = len(theta) // step * step
         return cls(*(signal[:count].reshape(-1, step).mean(axis=1) for signal in (theta - theta[0], z_ddot)))
@@ -63,7 +63,7 @@ HALF_CYCLES = 5
 
 
 def rover(watched: Watched, response: Response) -> FloatArray:
-    """The level at each sample."""
+    """Return the level at each sample."""
     cabin, lever = (_band_passed(signal) for signal in (watched.z_ddot, watched.theta))
     peaks, own = _extrema(cabin), _extrema(lever)
     level, last = np.zeros(len(cabin)), [0.0] * HALF_CYCLES
@@ -76,7 +76,8 @@ def rover(watched: Watched, response: Response) -> FloatArray:
 def _half_cycle(
     cabin: FloatArray, lever: FloatArray, own: list[int], before: int, now: int, response: Response
 ) -> float:
-    """Amplitude between two extrema of the cabin's acceleration; 0 if frequency or phase are not the coupling's."""
+    """Return amplitude between two extrema of the cabin's acceleration; 0 if frequency or phase are not the
+    coupling's."""
     frequency = RATE / (2.0 * (now - before))
     index = int(np.searchsorted(own, now, side="right"))
     if not ROVER_BAND[0] <= frequency <= ROVER_BAND[1] or index < 2:
@@ -100,7 +101,7 @@ def _band_passed(signal: FloatArray) -> FloatArray:
 
 
 def _filtered(signal: FloatArray, numerator: tuple[float, float, float], warped: float) -> FloatArray:
-    """A second-order Butterworth section by the bilinear transform; `warped` is the tangent of its corner."""
+    """Return a second-order Butterworth section by the bilinear transform; `warped` is the tangent of its corner."""
     square, root = warped * warped, math.sqrt(2.0) * warped
     scale = 1.0 + root + square
     b0, b1, b2 = (each / scale for each in numerator)
@@ -129,7 +130,7 @@ MEMORY = 2.0
 
 
 def spectrum(watched: Watched) -> FloatArray:
-    """The level at each sample."""
+    """Return the level at each sample."""
     forgets = math.exp(-1.0 / (MEMORY * RATE))
     turn = np.exp(-2j * np.pi * SPECTRUM / RATE)
     signals = np.stack((watched.z_ddot, watched.theta / LEVER_UNIT), axis=1)

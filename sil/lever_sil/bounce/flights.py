@@ -142,12 +142,12 @@ class Flown:
         return _low_passed(corrected, self.plan) if self.plan.low_pass else corrected
 
     def during(self, start: float, end: float) -> slice:
-        """The samples between two times [s]."""
+        """Return the samples between two times [s]."""
         first, last = np.searchsorted(self.time, (start, end))
         return slice(int(first), int(last))
 
     def margins(self, every: int) -> FloatArray:
-        """The true gain margin at every so many-th note [dB]."""
+        """Return the true gain margin at every so many-th note [dB]."""
         at = np.arange(0, len(self.time), STRIDE * every)
         limit = critical_gearing(self.plan.aircraft, self.truth.transfer(at))
         margin: FloatArray = 20.0 * np.log10(limit / np.maximum(self.plan.gearings(self.time[at]), 1e-9))
@@ -155,7 +155,7 @@ class Flown:
 
 
 def fly(plan: Plan) -> Flown:
-    """One flight. Raises LeverError."""
+    """Return one flight. Raise LeverError."""
     scenario = plan.scenario
     inputs = scenario_inputs.prepare(scenario)
     loop = Loop(scenario, inputs, by_frames=False, every=STRIDE)
@@ -181,8 +181,8 @@ def fly(plan: Plan) -> Flown:
 
 
 def uncertain_response(plan: Plan) -> AircraftResponse:
-    """What the firmware is given of an aircraft: its response, off by what is stated; the way from the accelerometer to
-    the seat is off by up to SEAT_ERROR."""
+    """Return what the firmware is given of an aircraft: its response, off by what is stated; the way from the
+    accelerometer to the seat is off by up to SEAT_ERROR."""
     coupled = plan.scenario.aircraft
     assert coupled is not None
     random = stream(f"known {coupled.aircraft.title}", plan.seed)
@@ -201,6 +201,6 @@ def _low_passed(angle: FloatArray, plan: Plan) -> FloatArray:
 
 
 def truth_of(plan: Plan) -> Truth:
-    """The pilot of a flight, at every STRIDE-th sample."""
+    """Return the pilot of a flight, at every STRIDE-th sample."""
     scenario = plan.scenario
     return scenario.truth(scenario.time()).at(slice(None, None, STRIDE))

@@ -61,7 +61,7 @@ class Measured:
 
 
 def excerpt(flown: Flown, points: int = 500) -> Excerpt:
-    """The part of a flight that a reader gets to see."""
+    """Return the part of a flight that a reader gets to see."""
     every = max(1, len(flown.notes) // points)
     said, step = flown.stability[::every], every * STRIDE
     return Excerpt(
@@ -76,7 +76,7 @@ def excerpt(flown: Flown, points: int = 500) -> Excerpt:
 
 
 def _least_critical(plan: Plan) -> float:
-    """The least gearing that is critical at any time of a flight [1]."""
+    """Return the least gearing that is critical at any time of a flight [1]."""
     truth = truth_of(plan)
     at = np.arange(0, len(truth.rest), 1000 // STRIDE)
     return float(critical_gearing(plan.aircraft, truth.transfer(at)).min())
@@ -111,7 +111,7 @@ def _doubled(flown: Flown) -> float:
 
 
 def _first(where: BoolArray, time: FloatArray) -> float:
-    """The first of these times [s]; inf: never."""
+    """Return the first of these times [s]; inf: never."""
     return float(time[int(np.argmax(where))]) if where.any() else math.inf
 
 
@@ -130,7 +130,7 @@ def _as_it_is(plan: Plan) -> Plan:
 
 
 def relaxing(craft: str, seed: int, *, spoil: Spoil = _as_it_is) -> Measured:
-    """A pilot relaxes until the loop is unstable: who sees it coming?"""
+    """Fly a pilot who relaxes until the loop is unstable: who sees it coming?"""
     flown = fly(geared(spoil(Plan(craft, seed, pilots.relaxing(seed), 1.0, duration=75.0)), BEYOND))
     notes, doubled = flown.notes, _doubled(flown)
     alarm = standing(flown.stability["state"] == lib.LEVER_BOUNCE_ALARM, notes, doubled)
@@ -151,7 +151,7 @@ def relaxing(craft: str, seed: int, *, spoil: Spoil = _as_it_is) -> Measured:
 
 
 def _detected(flown: Flown) -> Sequence[tuple[FloatArray, FloatArray, float]]:
-    """Time [s], level and threshold of each of the baselines."""
+    """Return time [s], level and threshold of each of the baselines."""
     coupled = flown.plan.scenario.aircraft
     assert coupled is not None
     watched = Watched.of(flown.theta, flown.z_ddot, flown.plan.scenario.period)
@@ -163,7 +163,8 @@ def _detected(flown: Flown) -> Sequence[tuple[FloatArray, FloatArray, float]]:
 
 
 def _margins(flown: Flown) -> Figures:
-    """How right the stated gain margin is, where one is stated and the lever does not swing by more than SWUNG."""
+    """Return how right the stated gain margin is, where one is stated and the lever does not swing by more than
+    SWUNG."""
     every = 25
     said, true = flown.stability[::every], flown.margins(every)
     angle = np.abs(flown.theta - flown.truth.rest)
@@ -180,7 +181,7 @@ def _margins(flown: Flown) -> Figures:
 
 
 def stable(craft: str, seed: int, *, duration: float, ratio: float = STABLE, spoil: Spoil = _as_it_is) -> Measured:
-    """A restless pilot in a loop that stays stable: who raises an alarm?"""
+    """Fly a restless pilot in a loop that stays stable: who raises an alarm?"""
     flown = fly(geared(spoil(Plan(craft, seed, pilots.restless(seed, duration), 1.0, duration=duration)), ratio))
     alarmed = flown.stability["state"] == lib.LEVER_BOUNCE_ALARM
     (_, rover, rover_limit), (_, spectrum, spectrum_limit) = _detected(flown)
@@ -209,7 +210,7 @@ def _slack(craft: str, seed: int, mitigation: str, **changes: Any) -> Plan:
 
 
 def raised(plan: Plan, ratio: float, critical: float | None = None) -> Plan:
-    """A stable flight in which the gearing goes up to so many times the critical one, which may be known."""
+    """Return a stable flight in which the gearing goes up to so many times the critical one, which may be known."""
     critical = critical or _least_critical(plan)
     return replace(plan, gearing=ratio * critical, raised_from=min(ratio, STABLE) * critical)
 
@@ -220,7 +221,7 @@ def _vibration(flown: Flown) -> float:
 
 
 def _uncoupled(plan: Plan) -> float:
-    """The vibration by the same gusts while nobody's lever turns the blades."""
+    """Return the vibration by the same gusts while nobody's lever turns the blades."""
     return _vibration(fly(replace(plan, gearing=1e-9, raised_from=None, mitigation="none", dither=0.0)))
 
 
@@ -254,7 +255,7 @@ CANCELLED_AT = 2.0
 
 
 def cancelled(craft: str, seed: int, *, mitigation: str, **changes: Any) -> Measured:
-    """How much of what the cabin does to the lever is left in its corrected angle."""
+    """Return how much of what the cabin does to the lever is left in its corrected angle."""
     flown = fly(raised(_slack(craft, seed, mitigation, **changes), CANCELLED_AT))
     involuntary, residual = _involuntary(flown)
     window = flown.during(30.0, 60.0)
@@ -271,7 +272,8 @@ def cancelled(craft: str, seed: int, *, mitigation: str, **changes: Any) -> Meas
 
 
 def _involuntary(flown: Flown) -> tuple[FloatArray, FloatArray]:
-    """What cabin and motor alone make of the lever's angle [rad], and what the correction leaves of that; 2 to 8 Hz."""
+    """Return what cabin and motor alone make of the lever's angle [rad], and what the correction leaves of that; 2
+    to 8 Hz."""
     period = flown.plan.scenario.period
     quiet = Conditions(flown.z_ddot, period, 0.0, 0.0, np.random.default_rng(0))
     theta, _, _ = plants.move(flown.truth, quiet, flown.tau_m)
@@ -307,8 +309,8 @@ VOLUNTARY = 0.5
 
 
 def voluntary(craft: str, seed: int, *, mitigation: str, ratio: float = STABLE, **changes: Any) -> Measured:
-    """What the mitigation makes of the pilot's own flying: his trim to the corrected angle, with it over without, at so
-    many times the critical gearing. At 0 the cabin does not answer."""
+    """Return what the mitigation makes of the pilot's own flying: his trim to the corrected angle, with it over
+    without, at so many times the critical gearing. At 0 the cabin does not answer."""
     pilot = pilots.table(pilots.arm(seed, pilots.SLACK))
     moves = {"kind": "sinusoid", "mean": pilot["trim"], "amplitude": "2 deg", "frequency": f"{VOLUNTARY} Hz"}
     plan = geared(_slack(craft, seed, mitigation, pilot=pilot | {"trim": moves}, **changes), max(ratio, 1e-9))
@@ -322,7 +324,7 @@ def voluntary(craft: str, seed: int, *, mitigation: str, ratio: float = STABLE, 
 
 
 def _answer(flown: Flown) -> complex:
-    """Of the corrected angle at VOLUNTARY, over twenty cycles [rad]."""
+    """Return the answer of the corrected angle at VOLUNTARY, over twenty cycles [rad]."""
     window = flown.during(20.0, 60.0)
     turned = np.exp(-2j * math.pi * VOLUNTARY * flown.time[window])
     return complex(np.mean(flown.corrected[window] * turned))
@@ -356,7 +358,8 @@ _NOTHING, _NO_TORQUE = math.radians(0.005), 2e-3
 
 
 def faulty(craft: str, seed: int, *, mitigation: str, spoil: Callable[[Plan], Plan]) -> Measured:
-    """How soon after a fault correction and torque are zero, and by how much the correction jumps in a sample."""
+    """Return how soon after a fault correction and torque are zero, and by how much the correction jumps in a
+    sample."""
     plan = spoil(replace(_slack(craft, seed, mitigation), duration=FAULT + 2.0, dither=0.0))
     flown = fly(raised(plan, CANCELLED_AT))
     after = flown.during(FAULT, FAULT + 2.0)

@@ -59,7 +59,7 @@ def restless(seed: int, duration: float) -> Table:
 
 
 def gripping(seed: int, at: float, factor: float) -> Table:
-    """A slack arm that tightens suddenly."""
+    """Return a slack arm that tightens suddenly."""
     pilot = arm(seed, SLACK)
     written = table(pilot)
     for name, unit in (("c_p", "N s/m"), ("k_p", "N/m")):

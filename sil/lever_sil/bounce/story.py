@@ -29,7 +29,7 @@ _MOST = 10.0  # [dB]
 
 
 def tell() -> Story:
-    """Margin, lever, correction and cabin in both flights. Raises LeverError."""
+    """Return margin, lever, correction and cabin in both flights. Raise LeverError."""
     plan = geared(Plan("uh60_like", 1, pilots.relaxing(1), 1.0), _BEYOND)
     without, mitigated = fly(plan), fly(replace(plan, mitigation=BOTH))
     rows = [axis("gain margin [dB]", range=[-5.0, _MOST])]

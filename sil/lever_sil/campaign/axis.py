@@ -31,7 +31,7 @@ def _read_also(values: Any, place: Place) -> dict[str, tuple[Written, ...]]:
 
 
 def number_of(written: Written) -> tuple[float, str] | None:
-    """Number and unit, as written; None for what is a name."""
+    """Return number and unit, as written; None for what is a name."""
     if isinstance(written, str):
         match = _QUANTITY.fullmatch(written)
         return (float(match[1]), match[2]) if match else None
@@ -73,7 +73,7 @@ class Axis:
         object.__setattr__(self, "unit", units.pop() if self.is_number else "")
 
     def check(self, gridded: bool) -> None:
-        """Raises ValueError where it does not suit a design."""
+        """Raise ValueError where it does not suit a design."""
         if self.range and gridded and self.steps is None:
             raise ValueError(f"{self.key}: steps: how many values a grid has between those of range is missing")
         if self.steps is not None and not (self.range and gridded):
@@ -100,20 +100,20 @@ class Axis:
         return self.name or self.key
 
     def at(self, position: float) -> dict[str, Written]:
-        """What is set at a position from 0 to 1."""
+        """Return what is set at a position from 0 to 1."""
         if self.values:
             index = min(int(position * len(self.values)), len(self.values) - 1)
             return {key: values[index] for key, values in self._given().items()}
         return {key: _between(values, position, self.scale) for key, values in self._given().items()}
 
     def of_grid(self, index: int) -> dict[str, Written]:
-        """What is set by value `index` of a grid."""
+        """Return what is set by value `index` of a grid."""
         if self.values:
             return {key: values[index] for key, values in self._given().items()}
         return self.at(index / (self.size - 1))
 
     def column(self, point: Mapping[str, Written]) -> float | str:
-        """What a row has of it."""
+        """Return what a row has of it."""
         number = number_of(point[self.key])
         return number[0] if self.is_number and number else str(point[self.key])
 

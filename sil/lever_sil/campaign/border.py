@@ -64,7 +64,7 @@ def _border(
 
 
 def _draws(runs: Runs, rng: np.random.Generator) -> tuple[Array, Array]:
-    """(1 + DRAWS,) error and coverage of a cell: of its runs, and of draws of as many of them."""
+    """Return (1 + DRAWS,) error and coverage of a cell: of its runs, and of draws of as many of them."""
     count = len(runs.error)
     errors, covered = [np.median(runs.error, keepdims=True)], [runs.coverage.mean(axis=0).min(keepdims=True)]
     block = max(1, _BLOCK // count)
@@ -76,7 +76,7 @@ def _draws(runs: Runs, rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def crossing(values: Array, limit: float, position: Array) -> Array:
-    """(B,) where values (B, n) at the positions (n,) first go beyond the limit, straight between two of them.
+    """Return (B,) where values (B, n) at the positions (n,) first go beyond the limit, straight between two of them.
 
     -inf where the first is beyond already, inf where none is.
     """

@@ -52,7 +52,7 @@ class Map:
     """By estimator, and panel, y, x."""
 
     def array(self, estimator: str, panel: int, statistic: Callable[[Runs], float]) -> Array:
-        """(y, x) of a function of Runs; NaN for an empty cell."""
+        """Return (y, x) of a function of Runs; NaN for an empty cell."""
         cells = self.runs[estimator]
         values = np.full((len(self.y.values), len(self.x.values)), np.nan)
         for (at, row, column), runs in cells.items():
@@ -62,28 +62,28 @@ class Map:
 
 
 def error(runs: Runs) -> float:
-    """Median over runs."""
+    """Return median over runs."""
     return float(np.median(runs.error))
 
 
 def coverage(runs: Runs) -> float:
-    """Of the quantity that has the least, over all runs; NaN where no σ is stated."""
+    """Return the coverage of the quantity that has the least, over all runs; NaN where no σ is stated."""
     return float(np.min(np.mean(runs.coverage, axis=0)))
 
 
 def nees(runs: Runs) -> float:
-    """Mean over runs."""
+    """Return mean over runs."""
     finite = runs.nees[np.isfinite(runs.nees)]
     return float(np.mean(finite)) if len(finite) else math.nan
 
 
 def settled(runs: Runs) -> float:
-    """Median over runs [s]."""
+    """Return median over runs [s]."""
     return float(np.median(runs.settled))
 
 
 def flagged(runs: Runs) -> float:
-    """Mean over runs; NaN for an estimator that flags nothing."""
+    """Return mean over runs; NaN for an estimator that flags nothing."""
     finite = runs.flagged[np.isfinite(runs.flagged)]
     return float(np.mean(finite)) if len(finite) else math.nan
 
@@ -92,7 +92,7 @@ _ONE = Scale("", ("",))
 
 
 def read(plan: Plan, folder: Path) -> Map:
-    """All that is there of a campaign."""
+    """Return all that is there of a campaign."""
     axes = plan.spec.vary[-3:]
     given = {axis.key: _scale(plan, axis) for axis in axes}
     scales = [_ONE] * (3 - len(axes)) + list(given.values())
@@ -156,7 +156,7 @@ def _runs(
 
 
 def _cell(values: NDArray[np.generic], scale: Scale) -> NDArray[np.int64]:
-    """Which cell of a scale each value is in: the nearest."""
+    """Return which cell of a scale each value is in: the nearest."""
     if scale.is_named:
         return np.array([scale.values.index(value) for value in values], dtype=np.int64)
     at = np.log(values.astype(np.float64)) if scale.is_log else values.astype(np.float64)

@@ -42,7 +42,7 @@ class Chunk:
     end: int
 
     def name(self, fingerprint: str) -> str:
-        """Its file."""
+        """Return its file."""
         return f"{fingerprint}-{self.first:010d}-{self.end - 1:010d}.parquet"
 
 
@@ -66,11 +66,11 @@ class Plan:
         return Chunk(number * self.size, min((number + 1) * self.size, self.spec.flights))
 
     def runs(self, chunk: Chunk) -> int:
-        """Rows of a chunk."""
+        """Return rows of a chunk."""
         return (chunk.end - chunk.first) * len(self.spec.estimators)
 
     def done(self, folder: Path) -> set[int]:
-        """Numbers of the chunks whose files are there and whole. Raises LeverError when another campaign is."""
+        """Return numbers of the chunks whose files are there and whole. Raise LeverError when another campaign is."""
         numbers = set()
         for file in _listed(folder):
             match = _NAME.fullmatch(file.name)
@@ -110,12 +110,13 @@ def _code() -> bytes:
 
 
 def fingerprint(spec: Spec) -> str:
-    """What the names of a campaign's files begin with: of the spec and of the shared libraries that make its rows."""
+    """Return what the names of a campaign's files begin with: of the spec and of the shared libraries that make its
+    rows."""
     return hashlib.sha256(spec.hashed.encode() + _code()).hexdigest()[:16]
 
 
 def schema(plan: Plan) -> pa.Schema:
-    """The columns of a chunk's file; README.md describes them."""
+    """Return the columns of a chunk's file; README.md describes them."""
     import pyarrow as pa
 
     varied = [
@@ -137,7 +138,7 @@ def schema(plan: Plan) -> pa.Schema:
 
 
 def make(plan: Plan, chunk: Chunk, folder: Path) -> int:
-    """Runs a chunk and writes its file; returns how many rows it has. Raises LeverError."""
+    """Run a chunk and write its file; return how many rows it has. Raise LeverError."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -15,7 +15,8 @@ _POINT, _ORDER = 0, 1  # purposes of random numbers
 
 
 def point(spec: Spec, number: int) -> dict[str, Written]:
-    """What is set at point `number` (from 0): scenario values by dotted key. In a grid the last axis goes fastest."""
+    """Return what is set at point `number` (from 0): scenario values by dotted key. In a grid the last axis goes
+    fastest."""
     if spec.design == "grid":
         return _of_grid(spec, number)
     positions = _stream(spec, _POINT, number).random(len(spec.vary))
@@ -43,11 +44,11 @@ def _stream(spec: Spec, purpose: int, number: int) -> np.random.Generator:
 
 @lru_cache(maxsize=16)
 def _order(seed: int, axis: int, size: int) -> NDArray[np.int64]:
-    """Which of the `size` equal parts of an axis each point of a Latin hypercube is in."""
+    """Return which of the `size` equal parts of an axis each point of a Latin hypercube is in."""
     rng = np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(_ORDER, axis))))
     return rng.permutation(size)
 
 
 def columns(spec: Spec, values: Mapping[str, Written]) -> dict[str, float | str]:
-    """What rows have of a point: the value of each axis."""
+    """Return what rows have of a point: the value of each axis."""
     return {axis.key: axis.column(values) for axis in spec.vary}

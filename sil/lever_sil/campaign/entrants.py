@@ -50,15 +50,15 @@ class Entrant(ABC):
 
     @abstractmethod
     def unfit(self, scenario: Scenario) -> str:
-        """Why it cannot be run on flights like this; empty if it can."""
+        """Return why it cannot be run on flights like this; empty if it can."""
 
     def flies_in(self, scenario: Scenario) -> bool:
-        """Whether it is the firmware in the loop; if not, it is given afterwards what was measured."""
+        """Return whether it is the firmware in the loop; if not, it is given afterwards what was measured."""
         return False
 
     @abstractmethod
     def track(self, flights: Sequence[Flight]) -> Track:
-        """Runs over flights of one point. Raises LeverError."""
+        """Run over flights of one point. Raise LeverError."""
 
 
 class Firmware(Entrant):

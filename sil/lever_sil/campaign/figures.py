@@ -29,13 +29,13 @@ class BrokenDownError(ValueError):
 
 
 def names(model: str) -> tuple[str, ...]:
-    """Of the columns of figures, for estimators with this model."""
+    """Return the names of the columns of figures, for estimators with this model."""
     judged = [f"{what}_{each.key}" for each in quantities(model) for what in ("rms", "bias", "coverage")]
     return (*judged, "nees", "nis", "settled_s", "flagged")
 
 
 def of_run(flight: Flight, track: Track, run: int) -> Figures:
-    """Of run `run` of a track, whose truth is that of `flight`. Raises BrokenDownError."""
+    """Return the of run of run `run` of a track, whose truth is that of `flight`. Raise BrokenDownError."""
     counted = flight.judged
     values = track.values[run]
     broken = ~(np.abs(values) < _MOST).all(axis=1)
@@ -64,7 +64,8 @@ def of_run(flight: Flight, track: Track, run: int) -> Figures:
 
 
 def _nees(flight: Flight, track: Track, run: int) -> float | None:
-    """Mean over the judged times of eᵀ P⁻¹ e of the parameters, which is 3 where the stated covariance is right."""
+    """Return mean over the judged times of eᵀ P⁻¹ e of the parameters, which is 3 where the stated covariance is
+    right."""
     if track.covariance is None or not np.isfinite(flight.truth[:, :PARAMETERS]).all():
         return None
     truth: Array = flight.truth[:, :PARAMETERS]

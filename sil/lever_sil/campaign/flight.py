@@ -49,7 +49,8 @@ class Flight:
 
 
 def simulate(scenario: Scenario, every: float, *, measured: bool) -> Flight:
-    """A flight, looked at `every` so many seconds; with what was measured if that is asked for. Raises LeverError."""
+    """Return a flight, looked at `every` so many seconds; with what was measured if that is asked for. Raises
+    LeverError."""
     inputs = scenario_inputs.prepare(scenario)
     step = max(1, round(every / scenario.period))
     loop = Loop(scenario, inputs, by_frames=False, every=step)
@@ -77,5 +78,5 @@ def _measured(scenario: Scenario, inputs: Inputs, loop: Loop) -> dict[str, Array
 
 
 def beside(flights: Sequence[Flight], name: str) -> Array:
-    """(B, K) a measured column of flights of one length."""
+    """Return (B, K) a measured column of flights of one length."""
     return np.stack([flight.measured[name] for flight in flights])

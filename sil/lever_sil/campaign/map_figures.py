@@ -57,7 +57,7 @@ _LINE = "Line: the border where tracking fails, with its 95 % band."
 
 
 def figures(cells: Map, borders: Sequence[Border]) -> list[MapFigure]:
-    """The error, and each other quantity that any estimator has."""
+    """Return the error, and each other quantity that any estimator has."""
     panels = range(len(cells.panels.values))
     lines = {(name, panel): _line(cells, borders, name, panel) for name in cells.runs for panel in panels}
     maps: list[MapFigure] = []
@@ -75,7 +75,7 @@ def figures(cells: Map, borders: Sequence[Border]) -> list[MapFigure]:
 
 
 def _values(cells: Map, quantity: _Quantity, name: str, panel: int) -> Array:
-    """(y, x) in the unit of the quantity."""
+    """Return (y, x) in the unit of the quantity."""
     values = cells.array(name, panel, quantity.statistic)
     return np.where(np.isfinite(values), quantity.scale * values, np.nan)
 

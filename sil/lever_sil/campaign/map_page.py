@@ -20,7 +20,7 @@ from .spec import Failure
 def build(
     plan: Plan, cells: Map, figures: Sequence[MapFigure], border: Sequence[Row], by_estimator: Sequence[Row]
 ) -> str:
-    """The whole page; `border` are the rows of its table."""
+    """Return the whole page; `border` are the rows of its table."""
     spec, length = plan.spec, f"{60.0 * plan.minutes:g}"
     page = Page(spec.title, f"{html.escape(spec.description)} {spec.runs:,} runs of {length} s.", "lever campaign")
     for figure in figures:

@@ -25,7 +25,7 @@ FILES = ("map.html", "map.svg", "border.csv")
 
 
 def write(plan: Plan, folder: Path, origin: Provenance | None = None) -> tuple[str, ...]:
-    """Writes the files of a campaign whose last axis has numbers; returns their names. Raises LeverError."""
+    """Write the files of a campaign whose last axis has numbers; return their names. Raise LeverError."""
     if not _has_map(plan):
         return ()
     cells = read(plan, folder)
@@ -39,7 +39,7 @@ def write(plan: Plan, folder: Path, origin: Provenance | None = None) -> tuple[s
 
 
 def figures(folder: Path) -> list[MapFigure]:
-    """The maps of the campaign whose files a folder holds. Raises LeverError."""
+    """Return the maps of the campaign whose files a folder holds. Raise LeverError."""
     plan = Plan(spec.saved(folder))
     if not _has_map(plan):
         raise LeverError(f"{folder}: the last axis of the campaign has no numbers, so there is no map")
@@ -52,7 +52,7 @@ def _has_map(plan: Plan) -> bool:
 
 
 def rows(cells: Map, edge: Sequence[Border]) -> list[Row]:
-    """The border for people: beyond the map it is above or below the last value there."""
+    """Return the border for people: beyond the map it is above or below the last value there."""
     shown: list[Row] = []
     for each in edge:
         row: dict[str, str | float | None] = {"estimator": each.estimator}

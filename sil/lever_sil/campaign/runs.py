@@ -26,7 +26,7 @@ _EXPECTED = (LeverError, ArithmeticError, ValueError, OSError)
 
 
 def rows(spec: Spec, flights: range) -> Iterator[Row]:
-    """The rows of these flights: all estimators of each, in the order of their numbers."""
+    """Yield the rows of these flights: all estimators of each, in the order of their numbers."""
     beside = max(1, SAMPLES // spec.samples)
     for point, own in groupby(flights, key=lambda flight: flight // spec.seeds):
         numbers = list(own)
@@ -55,7 +55,7 @@ def _of_point(spec: Spec, point: int, numbers: Sequence[int]) -> Iterator[Row]:
 def _flights(
     spec: Spec, values: Mapping[str, Written], numbers: Sequence[int]
 ) -> tuple[dict[int, Flight], dict[int, str]]:
-    """Those that could be simulated, and the errors of the others, by number."""
+    """Return those that could be simulated, and the errors of the others, by number."""
     flights: dict[int, Flight] = {}
     errors: dict[int, str] = {}
     try:
@@ -74,7 +74,7 @@ def _flights(
 
 
 def _figures(name: str, flights: dict[int, Flight]) -> dict[int, figures.Figures | str]:
-    """Of an estimator, for each flight by its number; an error as text."""
+    """Return the figures of an estimator, for each flight by its number; an error as text."""
     found: dict[int, figures.Figures | str] = {}
     for tracked, track in _tracks(name, flights):
         for index, number in enumerate(tracked):
@@ -87,7 +87,7 @@ def _figures(name: str, flights: dict[int, Flight]) -> dict[int, figures.Figures
 
 
 def _tracks(name: str, flights: dict[int, Flight]) -> Iterator[tuple[list[int], Track | str]]:
-    """All flights at once, or one by one where that fails, so that only the one at fault does."""
+    """Yield all flights at once, or one by one where that fails, so that only the one at fault does."""
     if not flights:
         return
     entrant, numbers = ENTRANTS[name], list(flights)

@@ -58,7 +58,7 @@ class Session:
 
 
 def run(plan: Plan, folder: Path, client: Client, show: Show) -> Session:
-    """Makes the chunks whose files are not there yet. Raises LeverError."""
+    """Make the chunks whose files are not there yet. Raise LeverError."""
     done = plan.done(folder)
     todo = (plan.chunk(number) for number in range(plan.count) if number not in done)
     session, before = Session(), sum(plan.runs(plan.chunk(number)) for number in done)
@@ -87,7 +87,8 @@ def run(plan: Plan, folder: Path, client: Client, show: Show) -> Session:
 def _results(
     client: Client, plan: Plan, folder: Path, todo: Iterator[Chunk], tick: Callable[[], None]
 ) -> Iterator[tuple[Chunk, tuple[int, float] | Exception]]:
-    """Of each chunk, when it is finished: rows and processor time, or how it killed the workers. Raises LeverError.
+    """Yield the results of each chunk, when it is finished: rows and processor time, or how it killed the workers.
+    Raise LeverError.
 
     Dask blames what kills a worker on all chunks that this worker was given. So these are tried again one by one, and
     only what kills the workers then is given up.
@@ -105,7 +106,7 @@ def _results(
         future.add_done_callback(finished.put)
 
     def fill() -> None:
-        """Gives the workers what they can do side by side, or one suspect."""
+        """Give the workers what they can do side by side, or one suspect."""
         while len(running) < most and len(suspects) < _MOST_LOST and (chunk := next(todo, None)):
             submit(chunk, chunk.name(plan.fingerprint))
         if suspects and not running:
@@ -137,7 +138,7 @@ def _results(
 
 
 def _next(client: Client, finished: queue.Queue[Future], tick: Callable[[], None]) -> Future | None:
-    """The next future that is done; None when a second has passed without. Raises LeverError."""
+    """Return the next future that is done; None when a second has passed without. Raise LeverError."""
     try:
         future = finished.get(timeout=1.0)
     except queue.Empty:
@@ -151,7 +152,7 @@ def _next(client: Client, finished: queue.Queue[Future], tick: Callable[[], None
 
 
 def _seen(client: Client, before: float) -> float:
-    """When there were workers last: now, or `before`. Raises LeverError when that is too long ago."""
+    """When there were workers last: now, or `before`. Raise LeverError when that is too long ago."""
     now = clock.monotonic()
     if client.nthreads():
         return now
@@ -167,7 +168,7 @@ def dashboard(client: Client) -> str:
 
 
 def work(plan: Plan, chunk: Chunk, folder: Path) -> tuple[int, float]:
-    """On a worker: makes a chunk; returns its rows and the processor time [s]."""
+    """On a worker: makes a chunk; return its rows and the processor time [s]."""
     here = socket.gethostname()
     if fingerprint(plan.spec) != plan.fingerprint:
         raise LeverError(f"the worker on {here} has another build of lever-cdkf: install the same everywhere")
@@ -191,9 +192,9 @@ def _time(seconds: float) -> str:
 
 @contextmanager
 def connected(address: str | None, workers: int) -> Iterator[Client]:
-    """A client of the scheduler at `address`, or of a cluster of so many processes on this machine.
+    """Yield a client of the scheduler at `address`, or of a cluster of so many processes on this machine.
 
-    Raises LeverError when nobody is there.
+    Raise LeverError when nobody is there.
     """
     import dask
     from distributed import Client, LocalCluster

@@ -68,7 +68,7 @@ def _read_values(values: Any, place: Place) -> dict[str, Any]:
 
 
 def _toml(value: Any) -> str:
-    """A value as an override has it."""
+    """Return a value as an override has it."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key} = {_toml(part)}" for key, part in value.items()) + "}"
     if isinstance(value, list):
@@ -166,7 +166,7 @@ class Spec:
         raise refused[0]
 
     def ends(self) -> Iterator[dict[str, Written]]:
-        """All axes at their first value, and each in turn at its last."""
+        """Yield all axes at their first value, and each in turn at its last."""
         first = {key: value for axis in self.vary for key, value in axis.at(0.0).items()}
         yield first
         for axis in self.vary:
@@ -189,11 +189,11 @@ class Spec:
         return self.flights * len(self.estimators)
 
     def overrides(self, point: Mapping[str, Written]) -> list[str]:
-        """What --set would be given for a point of the design."""
+        """Return what --set would be given for a point of the design."""
         return [f"{key}={_toml(value)}" for key, value in {**dict(self.set), **point}.items()]
 
     def flight(self, point: Mapping[str, Written], seed: int) -> Scenario:
-        """The scenario at a point, without its limits, which nobody asks for. Raises ScenarioError."""
+        """Return the scenario at a point, without its limits, which nobody asks for. Raise ScenarioError."""
         overrides = ["limits={}", *self.overrides(point), f"seed={seed}"]
         try:
             flight = scenarios.from_toml(self.content, self.scenario, overrides)
@@ -210,7 +210,7 @@ class Spec:
         return flight
 
     def _error(self, said: str) -> ScenarioError:
-        """An error of the scenario, with the place in the spec that has set what is wrong."""
+        """Return an error of the scenario, with the place in the spec that has set what is wrong."""
         where = said.removeprefix("--set ").partition(": ")[0].partition("=")[0].replace("[", ".").replace("]", "")
         for key, place in self._places():
             nested = f"{where}.".startswith(f"{key}.") or key.startswith(f"{where}.") or "." not in key
@@ -220,7 +220,7 @@ class Spec:
         return Place(self.file, "" if where == "every" else f"scenario {self.scenario}").error(said)
 
     def _places(self) -> Iterator[tuple[str, Place]]:
-        """What is set, by its dotted key, and where."""
+        """Yield what is set, by its dotted key, and where."""
         for index, axis in enumerate(self.vary):
             place = Place(self.file).at("vary").at(index)
             yield axis.key, place
@@ -239,7 +239,7 @@ class Spec:
 
 
 def load(name_or_path: str) -> Spec:
-    """The spec of that name, or in the file of that path (ending in .toml). Raises ScenarioError."""
+    """Return the spec of that name, or in the file of that path (ending in .toml). Raise ScenarioError."""
     file = file_of(name_or_path)
     spec = restored(SHELF.content(name_or_path), b"", file)
     try:
@@ -251,19 +251,19 @@ def load(name_or_path: str) -> Spec:
 
 
 def restored(written: bytes, content: bytes, file: str) -> Spec:
-    """The spec that a file holds, with its scenario. Raises ScenarioError."""
+    """Return the spec that a file holds, with its scenario. Raise ScenarioError."""
     spec: Spec = read(Spec, parse(written, file), Place(file))
     return dataclasses.replace(spec, name=Path(file).stem, file=file, written=written, content=content)
 
 
 def save(spec: Spec, folder: Path) -> None:
-    """Puts the spec into the folder of its files, so that these can be read without it. Raises LeverError."""
+    """Put the spec into the folder of its files, so that these can be read without it. Raise LeverError."""
     kept = {"file": spec.file, "spec": spec.written.decode(), "scenario": spec.content.decode()}
     write_text(folder / FILE, json.dumps(kept, indent=2, ensure_ascii=False) + "\n")
 
 
 def saved(folder: Path) -> Spec:
-    """The spec that was put there. Raises LeverError."""
+    """Return the spec that was put there. Raise LeverError."""
     try:
         kept = json.loads((folder / FILE).read_text(encoding="utf-8"))
         return restored(kept["spec"].encode(), kept["scenario"].encode(), kept["file"])
@@ -272,7 +272,7 @@ def saved(folder: Path) -> Spec:
 
 
 def _doubts(spec: Spec) -> list[str]:
-    """Why runs at an end of an axis cannot be. Raises ScenarioError when none can, of all or of an estimator."""
+    """Return why runs at an end of an axis cannot be. Raise ScenarioError when none can, of all or of an estimator."""
     model = spec.first.config.choices["model"]
     doubts: dict[str, None] = {}
     unfit = dict.fromkeys(spec.estimators, 0)

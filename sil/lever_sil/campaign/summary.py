@@ -23,14 +23,14 @@ _SHOWN_ERRORS = 5
 
 
 def table(folder: Path, columns: list[str], where: Any = None) -> pa.Table:
-    """These columns of all rows, of those that satisfy the pyarrow expression `where`."""
+    """Return these columns of all rows, of those that satisfy the pyarrow expression `where`."""
     import pyarrow.dataset as ds
 
     return ds.dataset(_files(folder), format="parquet").to_table(columns=columns, filter=where)
 
 
 def batches(folder: Path, columns: list[str], where: Any = None) -> Iterator[pa.RecordBatch]:
-    """The same in pieces that need no memory to speak of."""
+    """Yield the same in pieces that need no memory to speak of."""
     import pyarrow.dataset as ds
 
     scanned = ds.dataset(_files(folder), format="parquet").scanner(columns=columns, filter=where, batch_readahead=2)
@@ -42,7 +42,7 @@ def _files(folder: Path) -> list[str]:
 
 
 def build(plan: Plan, folder: Path, session: Session) -> dict[str, Any]:
-    """The content of summary.json."""
+    """Return the content of summary.json."""
     runs = failed = 0
     for batch in batches(folder, ["error"]):
         runs += batch.num_rows
@@ -59,7 +59,8 @@ def build(plan: Plan, folder: Path, session: Session) -> dict[str, Any]:
 
 
 def _factor(plan: Plan, folder: Path, session: Session) -> float | None:
-    """Simulated time ÷ processor time of the workers, of this call; of the one before where this had nothing to do."""
+    """Return simulated time ÷ processor time of the workers in this call; of the call before where there was nothing
+    to do."""
     if session.seconds > 0.0:
         return round(60.0 * plan.minutes * session.runs / session.seconds, 1)
     try:
@@ -70,7 +71,7 @@ def _factor(plan: Plan, folder: Path, session: Session) -> float | None:
 
 
 def errors(folder: Path) -> list[Row]:
-    """The first failed runs."""
+    """Return the first failed runs."""
     import pyarrow.dataset as ds
 
     found: list[Row] = []
@@ -82,7 +83,7 @@ def errors(folder: Path) -> list[Row]:
 
 
 def by_estimator(plan: Plan, folder: Path) -> list[Row]:
-    """Medians over all runs of each estimator."""
+    """Return medians over all runs of each estimator."""
     import pyarrow.dataset as ds
 
     names = [each.key for each in quantities(plan.model)]

@@ -102,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _say(name: str, changes: list[str]) -> None:
-    """What has become of a file, on standard error. Raises LeverError."""
+    """Say what has become of a file, on standard error. Raise LeverError."""
     from ..aircraft.aircraft import FILES
     from ..aircraft.state_space import read
     from ..aircraft.tabulated import Tabulated, is_response
@@ -134,7 +134,7 @@ def _number(written: str) -> float:
 
 
 def response(name: str, changes: list[str]) -> AircraftResponse:
-    """Of an aircraft by its name or file, or by its response in a .csv file. Raises LeverError."""
+    """Return the response of an aircraft by its name or file, or by its response in a .csv file. Raise LeverError."""
     from lever_cdkf.errors import LeverError
     from lever_cdkf.firmware.native import Config, Estimator
 
@@ -165,7 +165,7 @@ _OF_FIT = ("response_gearing", "delay")
 
 
 def _of_aircraft(changes: list[str]) -> dict[str, str]:
-    """Those that are not of the table."""
+    """Return those that are not of the table."""
     return {key: value for key, value in _assignments(changes).items() if key not in _SAID}
 
 
@@ -180,7 +180,7 @@ def _flown(name: str, given: dict[str, str]) -> Coupled:
 
 
 def _assignments(changes: list[str]) -> dict[str, str]:
-    """Raises LeverError."""
+    """Raise LeverError."""
     from lever_cdkf.errors import LeverError
 
     given: dict[str, str] = {}
@@ -193,7 +193,7 @@ def _assignments(changes: list[str]) -> dict[str, str]:
 
 
 def _quantity(key: str, written: str, unit: str) -> float:
-    """A number in `unit`, or with one of its units. Raises LeverError."""
+    """Return a number in `unit`, or with one of its units. Raise LeverError."""
     from lever_cdkf import units
     from lever_cdkf.errors import LeverError
 

@@ -123,7 +123,7 @@ def _run(plan: Plan, folder: Path, args: argparse.Namespace) -> Session:
 
 
 def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace) -> int:
-    """Files of what is done, and what is printed of it."""
+    """Return files of what is done, and what is printed of it."""
     from lever_cdkf.files import write_text
     from lever_cdkf.provenance import provenance
     from lever_cdkf.tables import print_tables
@@ -165,7 +165,7 @@ def _count(number: int, what: str) -> str:
 
 
 def _one(chosen: Spec, args: argparse.Namespace) -> int:
-    """A run alone."""
+    """Return a run alone."""
     from lever_cdkf.tables import print_tables
 
     from ..campaign import design

@@ -19,7 +19,7 @@ _NOT_HERE = ("models", "duration", "seed", "out", "score", "data")
 
 
 def run(args: argparse.Namespace) -> int:
-    """The firmware and its peers in the conditions of `lever envelope`."""
+    """Return the firmware and its peers in the conditions of `lever envelope`."""
     if args.list:
         print_tables(_listed(), args.json)
         return 0

@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
-    """The files that were asked for."""
+    """Write the files that were asked for."""
     from dataclasses import asdict
 
     from lever_cdkf.provenance import provenance, with_provenance
@@ -113,7 +113,7 @@ def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> N
 
 
 def _chosen(args: argparse.Namespace) -> list[Row]:
-    """The rows that were asked for. Raises LeverError for one that is not known."""
+    """Return the rows that were asked for. Raise LeverError for one that is not known."""
     from ..faults.rows import ROWS
 
     check_names("fault", args.only or (), ROWS, "lever faults --list")

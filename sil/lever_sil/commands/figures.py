@@ -75,7 +75,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def seed(text: str) -> int:
-    """A seed from the command line."""
+    """Return a seed from the command line."""
     value = int(text)
     if value < 0:
         raise argparse.ArgumentTypeError(f"{value} is negative")
@@ -97,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _figures(args: argparse.Namespace) -> dict[str, Make]:
-    """All that can be chosen from, by name. Raises LeverError for a campaign that cannot be read."""
+    """Return all that can be chosen from, by name. Raise LeverError for a campaign that cannot be read."""
     from ..study.figures.catalogue import FIGURES
     from ..study.figures.paper import PAPER
 
@@ -129,7 +129,7 @@ def _list() -> int:
 
 
 def _make(makers: Mapping[str, Make], args: argparse.Namespace) -> list[str]:
-    """Makes the figures and writes the files, all or none; returns their names. Raises LeverError."""
+    """Make the figures and write the files, all or none; return their names. Raise LeverError."""
     from lever_cdkf.exports import pictures
     from lever_cdkf.files import Outputs, writing
     from lever_cdkf.progress import Progress

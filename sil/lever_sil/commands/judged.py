@@ -38,7 +38,7 @@ class JudgedCommand(ABC, Generic[Row]):
 
     @abstractmethod
     def conditions(self) -> Mapping[str, Row]:
-        """All by name, in the order of the table."""
+        """Return all by name, in the order of the table."""
 
     def groups(self) -> Mapping[str, Mapping[str, Row]]:
         """Further conditions, in tables of their own by name: they run where --only names them, or their table."""
@@ -46,7 +46,7 @@ class JudgedCommand(ABC, Generic[Row]):
 
     @abstractmethod
     def figures(self) -> Mapping[str, Figure]:
-        """All that are measured, by name."""
+        """Return all that are measured, by name."""
 
     @abstractmethod
     def measure(self, chosen: Sequence[Row], seeds: int, show: Show) -> Sequence[Result]:
@@ -57,7 +57,7 @@ class JudgedCommand(ABC, Generic[Row]):
         """As HTML."""
 
     def add_parser(self, subparsers: argparse._SubParsersAction[Any]) -> None:
-        """The command line."""
+        """Add the parser of the command."""
         parser = subparsers.add_parser(self.name, help=self.about, description=self.description, epilog=self.epilog)
         parser.add_argument("--list", action="store_true", help="print the conditions and their limits, and stop")
         parser.add_argument(
@@ -83,7 +83,7 @@ class JudgedCommand(ABC, Generic[Row]):
         parser.set_defaults(run=self.run)
 
     def run(self, args: argparse.Namespace) -> int:
-        """The sub-command."""
+        """Return the sub-command."""
         from lever_cdkf.progress import Progress
         from lever_cdkf.tables import print_tables
 
@@ -115,7 +115,7 @@ class JudgedCommand(ABC, Generic[Row]):
         return 1 if missed else 0
 
     def _write(self, args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
-        """The files that were asked for."""
+        """Write the files that were asked for."""
         from dataclasses import asdict
 
         from lever_cdkf.provenance import provenance, with_provenance
@@ -131,7 +131,7 @@ class JudgedCommand(ABC, Generic[Row]):
         say(f"Written to {args.out}: {self.name}.html")
 
     def _chosen(self, args: argparse.Namespace) -> list[Row]:
-        """The conditions that were asked for. Raises LeverError for one that is not known."""
+        """Return the conditions that were asked for. Raise LeverError for one that is not known."""
         conditions, groups = self.conditions(), self.groups()
         if not args.only:
             return [condition for condition in conditions.values() if condition.quick or not args.quick]

@@ -9,7 +9,7 @@ from lever_cdkf.near_names import did_you_mean
 
 
 def check_names(what: str, names: Iterable[str], among: Iterable[str], listed_by: str) -> None:
-    """Raises LeverError for the first of `names` that is not `among` them; `listed_by` is a command that lists them."""
+    """Raise LeverError for the first of `names` that is not `among` them; `listed_by` is a command that lists them."""
     there: Sequence[str] = list(among)
     for name in names:
         if name not in there:

@@ -179,7 +179,7 @@ def _simulate_seeds(args: argparse.Namespace, overrides: Sequence[str]) -> int:
 
 
 def _check_seeds(args: argparse.Namespace) -> None:
-    """Raises LeverError for what does not go with --seeds."""
+    """Raise LeverError for what does not go with --seeds."""
     for option, number in (("--seeds", args.seeds), ("--jobs", args.jobs)):
         if number is not None and number < 1:
             raise LeverError(f"{option} {number}: must be at least 1")
@@ -199,7 +199,7 @@ def _check_seeds(args: argparse.Namespace) -> None:
 
 
 def _from_file(path: str) -> list[str]:
-    """A settings file as overrides of a scenario. Raises LeverError."""
+    """Return a settings file as overrides of a scenario. Raise LeverError."""
     from lever_cdkf.firmware.settings_file import read_assignments
 
     return [f"{name}={value}" for name, value in read_assignments(path).items()]
@@ -277,7 +277,7 @@ def _snapshots(args: argparse.Namespace) -> dict[str, float]:
 def open_bus(
     scenario: Scenario, interface: str, channel: str, bus_options: Mapping[str, Any] | None = None
 ) -> can.BusABC:
-    """The bus to the estimator; `bus_options` are python-can's for the interface. Raises LeverError."""
+    """Return the bus to the estimator; `bus_options` are python-can's for the interface. Raise LeverError."""
     if interface == "lever":
         from lever_cdkf.can.bus import LeverBus
 
@@ -286,7 +286,7 @@ def open_bus(
 
 
 def _tables(result: Result) -> Tables:
-    """What is printed at the end."""
+    """Return what is printed at the end."""
     from lever_cdkf.firmware.quantities import quantities
 
     summary, trace = result.summary, result.trace
@@ -326,12 +326,12 @@ def _tables(result: Result) -> Tables:
 
 
 def _times(times: Sequence[float | None]) -> str:
-    """Times after each change; a dash where the estimate never got there for good."""
+    """Return times after each change; a dash where the estimate never got there for good."""
     return ", ".join("-" if seconds is None else f"{seconds:.1f}" for seconds in times)
 
 
 def _reason(result: Result) -> str:
-    """Why a run did not pass, in a line."""
+    """Return why a run did not pass, in a line."""
     summary = result.summary
     reasons = [f"{summary.unanswered} samples without an answer"] if summary.unanswered else []
     if summary.misplaced:

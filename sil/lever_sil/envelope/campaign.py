@@ -51,7 +51,7 @@ class Result(judged.Result):
 
 
 def run(rows: Sequence[Condition], everything: Mapping[str, Condition], seeds: int, show: Show) -> list[Result]:
-    """The results of the rows, in their order; `seeds` runs of each, or some times as many where runs draw."""
+    """Return the results of the rows, in their order; `seeds` runs of each, or some times as many where runs draw."""
     references = [everything[row.against] for row in rows if row.against is not None]
     groups: dict[Group, list[Condition]] = {}
     for row in {row.name: row for row in (*references, *rows)}.values():  # a reference has the motion of its row
@@ -72,7 +72,7 @@ def run(rows: Sequence[Condition], everything: Mapping[str, Condition], seeds: i
 
 
 def _portions(runs: int, duration: float) -> list[range]:
-    """Seeds, not too many at a time."""
+    """Return seeds, not too many at a time."""
     most = _most_lanes(duration)
     return [range(first, min(first + most, runs)) for first in range(0, runs, most)]
 
@@ -82,7 +82,7 @@ def _most_lanes(duration: float) -> int:
 
 
 def _joined(parts: Sequence[Result]) -> Result:
-    """One result of some for different seeds; the excerpt is of the first."""
+    """Return one result of some for different seeds; the excerpt is of the first."""
     first = parts[0]
     values = {name: np.concatenate([part.values[name] for part in parts]) for name in first.values}
     return replace(first, values=values, runs=[name for part in parts for name in part.runs])
@@ -91,7 +91,7 @@ def _joined(parts: Sequence[Result]) -> Result:
 def _result(
     row: Condition, seeds: range, recording: Recording | None, outcomes: dict[str, Outcome], tick: Tick
 ) -> Result:
-    """Runs a condition; its outcome becomes one of `outcomes`, which later ones may be measured against."""
+    """Run a condition; its outcome becomes one of `outcomes`, which later ones may be measured against."""
     try:
         config = Config(model=row.model, settings=row.settings)
     except SettingsError as error:
@@ -109,7 +109,7 @@ def _result(
 
 
 def _recordings(jobs: Iterable[Job], tick: Tick) -> Iterator[tuple[Job, Recording | None]]:
-    """What happens in each; None where the firmware itself has a part in it."""
+    """Yield what happens in each; None where the firmware itself has a part in it."""
     batches: dict[float, list[Job]] = {}
     for job in jobs:
         if job.group.closed_loop is not None:
@@ -127,7 +127,7 @@ def _recordings(jobs: Iterable[Job], tick: Tick) -> Iterator[tuple[Job, Recordin
 
 
 def _simulated(batch: Sequence[Job], tick: Tick) -> Iterator[tuple[Job, Recording]]:
-    """Motions of one duration, side by side."""
+    """Yield motions of one duration, side by side."""
     if not batch:
         return
     given = [lanes(job.group.motion, job.seeds) for job in batch]

@@ -24,7 +24,7 @@ def least(figure: str, value: float) -> Limit:
 
 
 def right(rms: float, covered: float = 90.0) -> tuple[Limit, ...]:
-    """Of the natural frequency [%]."""
+    """Return the right of the natural frequency [%]."""
     return most("f_n rms", rms), least("f_n covered", covered)
 
 
@@ -139,7 +139,7 @@ _OUTAGES = (
 
 
 def _fault(name: str, title: str, what: str, kind: str, soon: float = 0.5, quick: bool = False) -> Condition:
-    """A sensor that fails for 10 s without saying so."""
+    """Return a sensor that fails for 10 s without saying so."""
     fault = Fault(what, kind, EVENT, EVENT + 10.0)
     learnt = "learnt" if soon == 0.5 else "learnt late"
     return Condition(
@@ -156,7 +156,7 @@ def _fault(name: str, title: str, what: str, kind: str, soon: float = 0.5, quick
 
 
 def _missing(name: str, title: str, what: str) -> Condition:
-    """A sensor that is not there."""
+    """Return a sensor that is not there."""
     sensors = Sensors(faults=(Fault(what, "invalid"),))
     return Condition(name, title, limits=(least("running", 99.0), *right(3.0, 85.0)), sensors=sensors)
 
@@ -209,7 +209,7 @@ _FAULTS = (
 
 
 def _off(name: str, title: str, sensors: Sensors) -> Condition:
-    """A sensor that is off, and no setting says so."""
+    """Return a sensor that is off, and no setting says so."""
     return Condition(name, title, limits=_ALL_COVERED, unless=_FLAGGED, sensors=sensors)
 
 
@@ -222,7 +222,8 @@ _RIGHT_OR_FLAGGED = most("unflagged", 3.0)
 
 
 def _slipping(friction: float) -> Condition:
-    """The pilot moves a lever that friction holds in between: it is nothing that a model of the firmware does."""
+    """Return the pilot moves a lever that friction holds in between: it is nothing that a model of the firmware
+    does."""
     title = f"friction of {friction:g} N m, through which the pilot moves the lever, 3° rms"
     also = ("unflagged", "silent")
     return Condition(f"friction_{friction:g}", title, Motion(friction=friction, wander=3.0), also=also, start=2.0)
@@ -250,7 +251,7 @@ _STANDING = (
 
 
 def _drawn(name: str, title: str, dither: float) -> Condition:
-    """Errors drawn from what the settings state."""
+    """Return errors drawn from what the settings state."""
     gain, delay, friction = 0.02, 0.5e-3, 0.05
     return Condition(
         name,
@@ -333,18 +334,18 @@ _GRIP_FORCE = (
 
 
 def _pilot(name: str, title: str, dither: float) -> Condition:
-    """A pilot whose arm is not the lever model's."""
+    """Return a pilot whose arm is not the lever model's."""
     limits = (most("θ/z̈ rms", 10.0), least("θ/z̈ covered", 85.0))
     return Condition(name, title, Motion(pilot=name, dither=dither), limits, (least("mismatch", 90.0),))
 
 
 def _hand(name: str, title: str) -> Condition:
-    """A hand as Mayo measured it, and the firmware's model of such hands: no flag excuses it."""
+    """Return a hand as Mayo measured it, and the firmware's model of such hands: no flag excuses it."""
     return replace(_pilot(name, f"{title}, model hand", 0.0), name=f"{name}_hand", unless=(), model="hand")
 
 
 def _reported(condition: Condition) -> Condition:
-    """The same without limits."""
+    """Return the same without limits."""
     return replace(condition, limits=(), unless=(), also=tuple(condition.figures))
 
 

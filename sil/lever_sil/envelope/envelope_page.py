@@ -15,7 +15,7 @@ from .measure import Excerpt
 
 
 def build(results: Sequence[Result], seeds: int) -> str:
-    """The whole page."""
+    """Return the whole page."""
     page = Page(
         "The conditions that a collective meets",
         f"Levers and pilots by a plant that shares nothing with the filter's model, {seeds} random pilots a condition, "
@@ -28,7 +28,7 @@ def build(results: Sequence[Result], seeds: int) -> str:
 
 
 def _chart(shown: Excerpt, result: Result) -> Figure:
-    """Natural frequency over time; dots at the foot where the firmware says: do not trust this."""
+    """Return natural frequency over time; dots at the foot where the firmware says: do not trust this."""
     low, high = shown.value - 2.0 * shown.sigma, shown.value + 2.0 * shown.sigma
     values = np.concatenate((shown.truth[shown.truth > 2.0], shown.value))
     values = values[np.isfinite(values)] if np.isfinite(values).any() else np.ones(1)

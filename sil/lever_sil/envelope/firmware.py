@@ -61,7 +61,7 @@ class Track:
 
 
 def estimates(config: Config, signals: Mapping[str, FloatArray], response: bool = False) -> Track:
-    """Feeds each run to an estimator of its own, a sample each sample_period; `response`: with the feedthrough."""
+    """Feed each run to an estimator of its own, a sample each sample_period; `response`: with the feedthrough."""
     count, width = signals["theta"].shape
     every = round(config.settings["sample_period"] / PERIOD)
     rate = signals.get("clock_rate", np.ones((1, width)))
@@ -104,7 +104,7 @@ def _track(notes: _Notes) -> Track:
 def closed_loop(
     config: Config, motion: Motion, seeds: Sequence[int], loop: ClosedLoop, tick: Callable[[], None]
 ) -> tuple[Recording, Track]:
-    """The firmware dithers the lever itself, and samples are lost at random; `tick` is called now and then.
+    """Return the firmware dithers the lever itself, and samples are lost at random; `tick` is called now and then.
 
     A lost sample lacks what LEVER_SAMPLE carries, theta, theta_dot and tau_m, or never comes at all. The motor holds
     the last torque that it was asked for.

@@ -31,7 +31,7 @@ _PENDING = 0.05  # [s] in which what was gathered before a flag may still be lea
 
 
 def fault_mask(*names: str) -> int:
-    """The bits of these faults of the façade."""
+    """Return the bits of these faults of the façade."""
     mask = 0
     for name in names:
         mask |= int(getattr(lib, f"LEVER_FAULT_{name}"))
@@ -54,7 +54,7 @@ class Outcome:
     """So long after an event errors and settling are followed [s]."""
 
     def during(self, start: float, end: float) -> BoolArray:
-        """Which estimates are of this time [s]."""
+        """Return which estimates are of this time [s]."""
         inside: BoolArray = (self.track.time >= start) & (self.track.time < end)
         return inside
 
@@ -68,7 +68,7 @@ class Outcome:
         return self.track.value[quantity] - self.recording.truth[quantity]
 
     def deviation(self, quantity: str) -> FloatArray:
-        """Size of the error in standard deviations that the firmware states."""
+        """Return size of the error in standard deviations that the firmware states."""
         return np.abs(self.error(quantity)) / self.track.sigma[quantity]
 
     def flagged(self, mask: int = DO_NOT_TRUST) -> BoolArray:
@@ -83,7 +83,7 @@ def _percent(true: BoolArray, axis: int | tuple[int, ...] = 0) -> Values:
 
 
 def _percent_rms(errors: NDArray[Any], axis: int | tuple[int, ...] = 0) -> Values:
-    """Of real or complex errors."""
+    """Return the percent rms of real or complex errors."""
     rms: Values = 100.0 * np.sqrt(np.mean(np.abs(errors) ** 2, axis=axis))
     return rms
 
@@ -102,7 +102,7 @@ def _largest(quantity: str, outcome: Outcome) -> Values:
 
 
 def _unflagged_deviation(outcome: Outcome) -> FloatArray:
-    """Largest error of any quantity in standard deviations, 0 with a fault of DO_NOT_TRUST (times, runs)."""
+    """Return largest error of any quantity in standard deviations, 0 with a fault of DO_NOT_TRUST (times, runs)."""
     worst = np.max([outcome.deviation(name)[outcome.judged] for name in QUANTITIES], axis=0)
     return np.where(outcome.flagged(DO_NOT_TRUST)[outcome.judged], 0.0, worst)
 
@@ -113,7 +113,7 @@ def _unflagged(outcome: Outcome) -> Values:
 
 
 def _silent(outcome: Outcome) -> Values:
-    """Seconds in a row."""
+    """Return seconds in a row."""
     wrong = _unflagged_deviation(outcome) > WRONG
     step = outcome.track.time[1] - outcome.track.time[0]
     return np.array([step * max((last - first + 1 for first, last in runs(each)), default=0) for each in wrong.T])
@@ -124,7 +124,7 @@ def _silent_share(outcome: Outcome) -> Values:
 
 
 def _changes(outcome: Outcome) -> Values:
-    """An hour; changes while CHANGE still shows the last are not told from it."""
+    """Return an hour; changes while CHANGE still shows the last are not told from it."""
     shown = outcome.flagged(fault_mask("CHANGE"))[outcome.judged]
     hours = len(shown) * (outcome.track.time[1] - outcome.track.time[0]) / 3600.0
     rate: Values = np.sum(shown[1:] & ~shown[:-1], axis=0) / hours
@@ -186,7 +186,8 @@ def _back(outcome: Outcome) -> Values:
 
 
 def _learnt(within: float, outcome: Outcome) -> Values:
-    """Greatest change of a parameter in an event, `within` seconds after its begin, in its standard deviations."""
+    """Return greatest change of a parameter in an event, `within` seconds after its begin, in its standard
+    deviations."""
     changes = [np.zeros(outcome.track.faults.shape[1])]
     for start, end in outcome.events:
         inside = outcome.during(start + within + _PENDING, end)
@@ -198,7 +199,7 @@ def _learnt(within: float, outcome: Outcome) -> Values:
 
 
 def _against(compute: Callable[[Outcome], Values], outcome: Outcome) -> Values:
-    """A figure over that of the reference."""
+    """Return a figure over that of the reference."""
     if outcome.reference is None:
         raise ValueError("this condition has no reference")
     ratio: Values = compute(outcome) / compute(replace(outcome.reference, window=outcome.window))
@@ -219,7 +220,7 @@ def _sigma_ratio(outcome: Outcome) -> Values:
 
 
 def _judged_feedthrough(outcome: Outcome) -> tuple[NDArray[np.complex128], Feedthrough]:
-    """True theta/z_ddot, and the firmware's at the judged times."""
+    """Return True theta/z_ddot, and the firmware's at the judged times."""
     truth, stated = outcome.recording.response, outcome.track.feedthrough
     if truth is None or stated is None:
         raise ValueError("this condition has no theta/z_ddot")
@@ -235,7 +236,7 @@ def _response_rms(outcome: Outcome) -> Values:
 
 
 def _response_covered(outcome: Outcome) -> Values:
-    """Gain and phase both."""
+    """Return gain and phase both."""
     truth, stated = _judged_feedthrough(outcome)
     ratio = truth / stated.response
     gain = np.abs(np.abs(ratio) - 1.0) <= 2.0 * stated.gain_sigma
@@ -316,7 +317,7 @@ class Excerpt:
 
 
 def excerpt(outcome: Outcome, points: int = 600) -> Excerpt:
-    """The part of an outcome that a reader gets to see."""
+    """Return the part of an outcome that a reader gets to see."""
     truth, run = outcome.recording.truth.get("f_n"), 0
     if truth is not None:
         run = int(np.argmax(_rms("f_n", outcome)))

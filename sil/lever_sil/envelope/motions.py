@@ -104,7 +104,7 @@ class Recording:
 
 
 def stream(what: str, seed: int) -> np.random.Generator:
-    """The random numbers of one purpose in one run."""
+    """Return the random numbers of one purpose in one run."""
     return np.random.default_rng([zlib.crc32(what.encode()), seed])
 
 
@@ -114,7 +114,7 @@ def columns(what: str, seeds: Sequence[int], count: int) -> FloatArray:
 
 
 def band_limited(white: FloatArray, band: tuple[float, float], rms: float) -> FloatArray:
-    """Noise that fills a band [Hz] and has this rms, exactly, in every column."""
+    """Return noise that fills a band [Hz] and has this rms, exactly, in every column."""
     spectrum = np.fft.rfft(white, axis=0)
     frequency = np.fft.rfftfreq(len(white), PERIOD)
     spectrum[(frequency < band[0]) | (frequency > band[1])] = 0.0
@@ -144,7 +144,7 @@ def excitation(motion: Motion, seeds: Sequence[int]) -> tuple[FloatArray, FloatA
 
 
 def _sine(time: FloatArray, wave: tuple[float, float], what: str, seeds: Sequence[int]) -> FloatArray:
-    """Of this amplitude and frequency [Hz], with a random phase in each run: (samples, runs)."""
+    """Return the sine of this amplitude and frequency [Hz], with a random phase in each run: (samples, runs)."""
     amplitude, frequency = wave
     phase = np.array([stream(what, seed).uniform(0.0, 2.0 * math.pi) for seed in seeds])
     sine: FloatArray = amplitude * np.sin(2.0 * math.pi * frequency * time[:, None] + phase)
@@ -166,7 +166,7 @@ def _ramp(time: FloatArray, start: float, length: float) -> FloatArray:
 
 
 def _moved(motion: Motion, seeds: Sequence[int], trim: FloatArray) -> FloatArray:
-    """The trim as the pilot moves it [rad]."""
+    """Return the trim as the pilot moves it [rad]."""
     time = motion.time
     if motion.sway is not None:
         amplitude, frequency = motion.sway
@@ -185,7 +185,7 @@ def _moved(motion: Motion, seeds: Sequence[int], trim: FloatArray) -> FloatArray
 
 
 def _retrims(time: FloatArray, retrims: tuple[float, float, float], seeds: Sequence[int]) -> FloatArray:
-    """Angle from the first trim [rad], which it never leaves by more than the greatest move."""
+    """Return angle from the first trim [rad], which it never leaves by more than the greatest move."""
     most, every, seconds = math.radians(retrims[0]), *retrims[1:]
     moments = every * np.arange(1.0, time[-1] // every + 1.0)
     knots = np.concatenate(((0.0,), np.stack((moments, moments + seconds), axis=1).ravel()))
@@ -216,7 +216,7 @@ def _up_or_down(factor: float, seeds: Sequence[int]) -> FloatArray:
 
 
 def lanes(motion: Motion, seeds: Sequence[int]) -> Lanes:
-    """What plant.py needs."""
+    """Return what plant.py needs."""
     time = motion.time
     z_ddot, tau_m, kick = excitation(motion, seeds)
     m_p, c_p, k_p, trim = arms(seeds)

@@ -46,7 +46,7 @@ LINEAR: dict[str, DynamicStiffness] = {"hysteretic": _hysteretic, "reflex": _ref
 
 
 def record(motion: Motion, seeds: Sequence[int], tick: Callable[[], None] = lambda: None) -> Recording:
-    """The recording of such a pilot, with the trim and the linear arm that others of that seed have.
+    """Return the recording of such a pilot, with the trim and the linear arm that others of that seed have.
 
     `tick` is called now and then.
     """

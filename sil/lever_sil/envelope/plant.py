@@ -70,13 +70,13 @@ class Lanes:
     hardware: Hardware = field(default_factory=Hardware)
 
     def at(self, samples: NDArray[np.intp], name: str) -> FloatArray:
-        """The rows of an array at these samples."""
+        """Return the rows of an array at these samples."""
         values: FloatArray = getattr(self, name)
         return values[samples if len(values) > 1 else np.zeros_like(samples)]
 
 
 def beside(parts: list[Lanes]) -> Lanes:
-    """The lanes of all, side by side; period and hardware are those of the first."""
+    """Return the lanes of all, side by side; period and hardware are those of the first."""
     columns = {}
     for each in fields(Lanes):
         arrays = [getattr(part, each.name) for part in parts]
@@ -127,7 +127,7 @@ class Plant:
         given.theta, given.theta_dot = self.struct.doubles(self.theta), self.struct.doubles(self.theta_dot)
 
     def column(self, values: FloatArray) -> dict[str, Any]:
-        """Values (samples, lanes), or (1, lanes), for C."""
+        """Return values (samples, lanes), or (1, lanes), for C."""
         wide = np.broadcast_to(values, (len(values), self.width))
         return {"value": self.struct.doubles(wide), "step": self.width if len(values) > 1 else 0}
 
@@ -137,8 +137,8 @@ class Plant:
 
 
 def grip_force(lanes: Lanes, theta: FloatArray, theta_dot: FloatArray) -> FloatArray:
-    """What the arm does to the lever, mean since the last sample [N]; of its weight, which the rest angle balances,
-    nothing. Process noise and disturbance act on the lever."""
+    """Return what the arm does to the lever, mean since the last sample [N]; of its weight, which the rest angle
+    balances, nothing. Process noise and disturbance act on the lever."""
 
     def since(values: FloatArray) -> FloatArray:
         earlier = np.concatenate((values[:1], values[:-1])) if len(values) > 1 else values

@@ -23,7 +23,8 @@ _OF_ARM = tuple(f"{name} {what}" for what in ("rms", "covered") for name in ("m_
 
 
 def _jump(name: str, title: str, motion: Motion, median: float, p90: float, worst: float) -> Condition:
-    """The arm changes at once, and the lever rests where it did. Limits are those of the time to 5 % of f_n [s]."""
+    """Return the arm changes at once, and the lever rests where it did. Limits are those of the time to 5 % of f_n
+    [s]."""
     settled = (most("settled", value, over) for value, over in ((median, "median"), (p90, "p90"), (worst, "worst")))
     return Condition(
         name,
@@ -52,8 +53,8 @@ _JUMPS = (
 
 
 def _long(name: str, title: str, motion: Motion, limits: tuple[Limit, ...]) -> Condition:
-    """Some hours in which no arm changes. The limits of re-trims and of steady flight are what was measured on
-    2026-11-25 with 40 seeds, 78 and 3.4 changes an hour, 1.36 and 0.83 % of f_n, plus two standard errors."""
+    """Return some hours in which no arm changes. The limits of re-trims and of steady flight are what was measured
+    on 2026-11-25 with 40 seeds, 78 and 3.4 changes an hour, 1.36 and 0.83 % of f_n, plus two standard errors."""
     return Condition(name, title, motion, limits, also=("changes", *_SHARES), runs=2)
 
 
@@ -81,7 +82,7 @@ _NO_CHANGE = (
 
 
 def _stick_slip(name: str, title: str, motion: Motion, start: float) -> Condition:
-    """The base moves a lever that friction holds in between: there is nothing in it to learn."""
+    """Return the base moves a lever that friction holds in between: there is nothing in it to learn."""
     return Condition(
         name,
         title,
@@ -136,7 +137,7 @@ _BURSTS = {
 
 
 def _moved(name: str, title: str, motion: Motion) -> tuple[Condition, ...]:
-    """The lever moves fast while samples are lost, and the firmware dithers."""
+    """Move the lever fast while samples are lost, and the firmware dithers."""
     return tuple(
         Condition(
             f"{name}_{lost}",
@@ -164,7 +165,7 @@ _LOST = (
 
 
 def _large(name: str, title: str, motion: Motion) -> Condition:
-    """The lever moves so far that a linear model is none."""
+    """Return the lever moves so far that a linear model is none."""
     return Condition(
         name, title, motion, (least("f_n covered", 88.0), most("silent share", 1.0)), also=("silent", *_OF_ARM)
     )

@@ -54,7 +54,7 @@ class Sensors:
 
 
 def measured(recording: Recording, sensors: Sensors, seeds: Sequence[int]) -> dict[str, FloatArray]:
-    """The signals that there are sensors of, (samples, runs); where a fault is the clock's, its rate."""
+    """Return the signals that there are sensors of, (samples, runs); where a fault is the clock's, its rate."""
 
     def drawn(mean: float, sigma: float, what: str) -> FloatArray:
         values: FloatArray = mean + sigma * columns(what, seeds, 1)[0]
@@ -88,14 +88,14 @@ def measured(recording: Recording, sensors: Sensors, seeds: Sequence[int]) -> di
 
 
 def lost(seeds: Sequence[int], count: int, share: float, length: float = PERIOD) -> BoolArray:
-    """Which samples are lost, (samples, runs): a share of all at random, in stretches of this length [s]."""
+    """Return which samples are lost, (samples, runs): a share of all at random, in stretches of this length [s]."""
     each = round(length / PERIOD)
     hit = np.stack([stream("lost", seed).random(-(-count // each)) < share for seed in seeds], axis=1)
     return np.repeat(hit, each, axis=0)[:count]
 
 
 def _delayed(signal: FloatArray, delay: FloatArray) -> FloatArray:
-    """Each column so much later [s], by interpolation; before its start it had its first value."""
+    """Return each column so much later [s], by interpolation; before its start it had its first value."""
     at = np.arange(len(signal), dtype=np.float64)
     return np.stack(
         [np.interp(at - late / PERIOD, at, column) for late, column in zip(delay, signal.T, strict=True)], axis=1
@@ -103,7 +103,7 @@ def _delayed(signal: FloatArray, delay: FloatArray) -> FloatArray:
 
 
 def _spoil(signal: FloatArray, fault: Fault, time: FloatArray, seeds: Sequence[int]) -> None:
-    """Puts the fault into the signal."""
+    """Put the fault into the signal."""
     during = np.flatnonzero((time >= fault.start) & (time < fault.end))
     if fault.kind == "stuck":
         signal[during] = signal[max(0, during[0] - 1)]

@@ -12,7 +12,7 @@ from .library import Struct
 
 
 def fill(struct: Struct, given: Any, flight: Flight, correction: FloatArray) -> None:
-    """Puts one in hover into an aircraft_t in a struct; `correction` gets what corrects the lever, a value a sample."""
+    """Put one in hover into an aircraft_t in a struct; `correction` gets what corrects the lever, a value a sample."""
     for name, value in vars(flight.constants).items():
         setattr(given, name, struct.doubles(np.array(value)) if name in ("step", "output") else value)
     given.states = len(flight.constants.step)

@@ -60,10 +60,10 @@ class FastRun:
 
 
 def run(scenario: Scenario, through_frames: bool = False, stride: float = STRIDE) -> FastRun:
-    """Runs a scenario against a fresh instance of the firmware, by structs, or through CAN frames with E2E protection.
+    """Run a scenario against a fresh instance of the firmware, by structs, or through CAN frames with E2E protection.
 
     By structs values keep their single precision; frames round them as on a bus. What is beyond the range of a frame is
-    not available either way. Raises LeverError, also for a pilot whose plant the C does not have.
+    not available either way. Raise LeverError, also for a pilot whose plant the C does not have.
     """
     inputs = scenario_inputs.prepare(scenario)
     every = max(1, round(stride / scenario.period))
@@ -123,7 +123,7 @@ class Loop:
         loop.health = self.struct.array("struct lever_health", self._healths, self._healths.dtype)
 
     def _fill_cabin(self, flight: Flight) -> FloatArray:
-        """A helicopter in hover; returns z_ddot as its pilot feels it, of which the first value is known."""
+        """Return a helicopter in hover; return z_ddot as its pilot feels it, of which the first value is known."""
         inputs, struct, cabin = self._inputs, self.struct, self.struct.pointer.cabin
         felt = inputs.z_ddot.copy()
         cabin.exists, cabin.period, cabin.rest = True, self._scenario.period, float(inputs.truth.rest[0])
@@ -167,7 +167,7 @@ class Loop:
             loop.command = self.struct.keep(_command_structs(values))
 
     def watch(self, aircraft: AircraftResponse | None) -> NDArray[Any]:
-        """The firmware watches the loop with this aircraft, where there is one; returns what is kept of that:
+        """Return the firmware watches the loop with this aircraft, where there is one; return what is kept of that:
         lever_stability_t."""
         self._estimator.watch(aircraft)
         kept = np.zeros(len(self._healths), struct_dtype("lever_stability_t"))
@@ -183,11 +183,11 @@ class Loop:
         self.struct.pointer.time_us = self.struct.array("uint32_t", time_us, np.uint32)
 
     def advance(self, until: int) -> int:
-        """Goes on to a sample; returns the one that it came to."""
+        """Go on to a sample; return the one that it came to."""
         return lib.loop_advance(self.struct.pointer, self._estimator.pointer, until)  # type: ignore[no-any-return]
 
     def keep_frames(self) -> None:
-        """Has advance() stop where it has filled a Traffic with frames."""
+        """Have advance() stop where it has filled a Traffic with frames."""
         loop, room = self.struct.pointer, _FRAMES_AT_ONCE
         self._traffic = Traffic(np.empty(room, np.uint16), np.empty(room, np.uint32), np.empty((room, 8), np.uint8))
         loop.frame_room = room
@@ -201,14 +201,14 @@ class Loop:
         self.struct.pointer.recorder = self.struct.keep(recorder.pointer)
 
     def take_frames(self) -> Traffic:
-        """Those since they were taken last."""
+        """Return those since they were taken last."""
         loop, traffic = self.struct.pointer, self._traffic
         taken = slice(0, loop.frames)
         loop.frames = 0
         return Traffic(traffic.identifier[taken].copy(), traffic.sample[taken].copy(), traffic.data[taken].copy())
 
     def check(self) -> None:
-        """Raises LeverError when the firmware has refused a command."""
+        """Raise LeverError when the firmware has refused a command."""
         loop = self.struct.pointer
         if loop.refused:
             raise LeverError(f"the estimator refuses COMMAND at {(loop.sample - 1) * self._scenario.period:g} s")
@@ -219,7 +219,7 @@ class Loop:
         return self._estimates, self._healths
 
     def result(self) -> FastRun:
-        """What is kept of it."""
+        """Return what is kept of it."""
         scenario, inputs, estimates = self._scenario, self._inputs, self._estimates
         every = self.struct.pointer.stride
         names = [each.key for each in quantities.parameters(scenario.config.choices["model"])]
@@ -247,14 +247,14 @@ class Loop:
 
 
 def available(name: str, values: FloatArray) -> FloatArray:
-    """Readings of the sensor `name`, NaN where they are beyond the range of their frame."""
+    """Return the readings of the sensor `name`, NaN where they are beyond the range of their frame."""
     field = _field(_MESSAGES.get(name, "LEVER_SAMPLE"), name)
     return np.where(np.abs(values / field["scale"]) < 0.5 * field["mask"], values, np.nan)  # most steps and a half
 
 
 @cache
 def _field(message: str, name: str) -> dict[str, float]:
-    """A loop_field_t of the DBC."""
+    """Return a loop_field_t of the DBC."""
     definition = codec.message(message)
     signal = definition.get_signal_by_name(name)
     valid = [other.start for other in definition.signals if other.name == f"{name}_valid"]
@@ -267,13 +267,13 @@ def _field(message: str, name: str) -> dict[str, float]:
 
 
 def _command_structs(commands: Sequence[Mapping[str, codec.Value]]) -> Any:
-    """Of type lever_command_t[]."""
+    """Return the command structs of type lever_command_t[]."""
     structs: list[Any] = [make_command(**values) for values in commands]  # type: ignore[arg-type]
     return ffi.new("lever_command_t[]", [each[0] for each in structs])
 
 
 def _command_frames(commands: Sequence[Mapping[str, codec.Value]]) -> Any:
-    """Of type lever_frame_t[]."""
+    """Return the command frames of type lever_frame_t[]."""
     sent: list[dict[str, Any]] = []
     commander = Commander()
     for values in commands:

@@ -20,23 +20,24 @@ class Struct:
         self._kept: list[Any] = []
 
     def array(self, ctype: str, values: NDArray[Any], dtype: Any) -> Any:
-        """A pointer to the values, for a field of the struct: a copy of them only where they are not as C has them."""
+        """Return a pointer to the values, for a field of the struct: a copy of them only where they are not as C has
+        them."""
         contiguous = np.ascontiguousarray(values, dtype)
         return self.keep(ffi.from_buffer(f"{ctype}[]", contiguous))
 
     def keep(self, pointer: Any) -> Any:
-        """The pointer, which lives as long as the struct."""
+        """Return the pointer, which lives as long as the struct."""
         self._kept.append(pointer)
         return pointer
 
     def kept(self) -> Sequence[Any]:
-        """All arrays that its pointers point to."""
+        """Return all arrays that its pointers point to."""
         return self._kept
 
     def cast(self, ctype: str, values: NDArray[np.float64]) -> Any:
-        """A pointer of that type to an array of doubles."""
+        """Return a pointer of that type to an array of doubles."""
         return ffi.cast(ctype, self.doubles(values))
 
     def doubles(self, values: NDArray[np.float64]) -> Any:
-        """The same, of the type double."""
+        """Return the same, of the type double."""
         return self.array("double", values, np.float64)

@@ -23,7 +23,7 @@ _KINDS: dict[type[Any], str] = {
 
 
 def has(truth: Truth) -> bool:
-    """Whether the C has it."""
+    """Return whether the C has it."""
     return isinstance(truth, tuple(_KINDS))
 
 
@@ -37,13 +37,13 @@ def move(truth: Truth, conditions: Conditions, command: FloatArray) -> tuple[Flo
 
 
 def outside(truth: Truth) -> float:
-    """Of the cabin's speed, what a pilot feels besides its acceleration [1/s]."""
+    """Return the outside of the cabin's speed, what a pilot feels besides its acceleration [1/s]."""
     return truth.hand.outside if isinstance(truth, mayo_plant.Mayo) else 0.0
 
 
 def fill(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> None:
-    """Puts a truth at rest, and what acts on it, into a plant_t in a struct. Where z_ddot comes to be known on the way,
-    it is what is felt()."""
+    """Put a truth at rest, and what acts on it, into a plant_t in a struct. Where z_ddot comes to be known on the
+    way, it is what is felt()."""
     if isinstance(truth, linear_plant.LinearTruth) and conditions.ahead > 1:
         conditions = truth.felt(conditions)
     last = len(conditions.z_ddot) - 1
@@ -59,7 +59,7 @@ def fill(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> No
 
 
 def _columns(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> _Columns:
-    """The coefficients; puts what else there is of a kind into the plant."""
+    """Return the coefficients; puts what else there is of a kind into the plant."""
     if isinstance(truth, linear_plant.LinearTruth):
         system = truth.system
         return system.stiffness, system.damping, system.gain, system.compliance, system.rest

@@ -34,12 +34,12 @@ _PLACE = {"COMMAND": 0.05, "LEVER_SAMPLE": 0.1, "GRIP_SAMPLE": 0.2, "BASE_SAMPLE
 
 
 def command(counter: int, **values: codec.Value) -> bytes:
-    """A COMMAND that changes these values only."""
+    """Return a COMMAND that changes these values only."""
     return codec.encode("COMMAND", counter, {"request": "none", **KEEP, **values})
 
 
 def unknown_command(counter: int) -> bytes:
-    """A COMMAND for a model that is not there."""
+    """Return a COMMAND for a model that is not there."""
     model = codec.message("COMMAND").get_signal_by_name("model")
     word = int.from_bytes(command(counter), "little") & ~(0xF << model.start) | 9 << model.start
     frame = bytearray(word.to_bytes(8, "little"))
@@ -85,12 +85,12 @@ class Bus:
         self.add(frames, order)
 
     def samples(self, time: Interval) -> Indices:
-        """Those in a time [s]."""
+        """Return those in a time [s]."""
         first, last = (min(self.count, round(moment / self.period)) for moment in time)
         return np.arange(first, last)
 
     def sent(self, messages: str | Sequence[str], time: Interval) -> Indices:
-        """Indices of the frames of messages that are sent in a time [s]."""
+        """Return indices of the frames of messages that are sent in a time [s]."""
         names = (messages,) if isinstance(messages, str) else messages
         identifiers = [codec.message(name).frame_id for name in names]
         moment = self.frames["of"] * self.period
@@ -98,11 +98,11 @@ class Bus:
         return np.flatnonzero(own)
 
     def lose(self, which: Indices) -> None:
-        """These never arrive."""
+        """Drop these frames: they never arrive."""
         self.frames, self.order = np.delete(self.frames, which), np.delete(self.order, which)
 
     def delivered(self) -> NDArray[np.void]:
-        """All in the order in which they arrive."""
+        """Return all in the order in which they arrive."""
         arrives = np.argsort(self.order, kind="stable")
         frames, at = self.frames[arrives], np.floor(self.order[arrives])
         frames["at"] = at
@@ -129,7 +129,7 @@ def freeze(bus: Bus, time: float) -> None:
 
 
 def flipped(message: str, byte: int) -> Fault:
-    """One bit of a byte is flipped in every tenth frame, or in every COMMAND."""
+    """Flip one bit of a byte in every tenth frame, or in every COMMAND."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         hit = bus.sent(message, time)[:: 1 if message == "COMMAND" else 10]
@@ -146,7 +146,7 @@ def wrong_crc(message: str) -> Fault:
 
 
 def masquerade(message: str) -> Fault:
-    """The identifier is that of this message, the CRC another's."""
+    """Send the identifier of this message with the CRC of another."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         bus.frames["data_id"][bus.sent(message, time)] = codec.data_ids("HEALTH")[0]
@@ -155,7 +155,7 @@ def masquerade(message: str) -> Fault:
 
 
 def short(message: str, length: int) -> Fault:
-    """The frame has this length."""
+    """Give the frame this length."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         bus.frames["length"][bus.sent(message, time)] = length
@@ -164,7 +164,7 @@ def short(message: str, length: int) -> Fault:
 
 
 def marked(message: str, mark: int) -> Fault:
-    """Another node sends frames of the same identifier that are extended, remote or error frames."""
+    """Return another node sends frames of the same identifier that are extended, remote or error frames."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         at = bus.sent(message, time)
@@ -180,7 +180,7 @@ def marked(message: str, mark: int) -> Fault:
 
 
 def repeated(message: str) -> Fault:
-    """Each frame comes twice."""
+    """Return each frame comes twice."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         at = bus.sent(message, time)
@@ -190,7 +190,7 @@ def repeated(message: str) -> Fault:
 
 
 def counting(messages: str | Sequence[str], count: Callable[[Indices], Indices]) -> Fault:
-    """The counter is made from the number of the sample."""
+    """Make the counter from the number of the sample."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         at = bus.sent(messages, time)
@@ -213,7 +213,7 @@ def commands(data: Callable[[int], bytes], every: int = KEEP_ALIVE, usual: bool 
 
 
 def hanging_command() -> Fault:
-    """The last COMMAND before is sent again and again, as by a mailbox that nobody writes to any more."""
+    """Repeat the last COMMAND again and again, as a mailbox does that nobody writes to any more."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         later = bus.sent("COMMAND", time)
@@ -223,7 +223,7 @@ def hanging_command() -> Fault:
 
 
 def flood(values: Sequence[Mapping[str, codec.Value]], last: Mapping[str, codec.Value], each: int = 1) -> Fault:
-    """A new COMMAND in each sample, or several, which take turns; then one that sets things right again."""
+    """Return a new COMMAND in each sample, or several, which take turns; then one that sets things right again."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         bus.lose(bus.sent("COMMAND", time))
@@ -261,7 +261,7 @@ def lost(messages: str | Sequence[str], share: float) -> Fault:
 
 
 def samples_lost(share: float) -> Fault:
-    """All messages of a sample, at random."""
+    """Return all messages of a sample, at random."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         gone = bus.random.random(bus.count) < share
@@ -293,7 +293,7 @@ def late(messages: str | Sequence[str], samples: float, every: int = 1) -> Fault
 
 
 def stale(message: str) -> Fault:
-    """The sender goes on counting, but sends the same content."""
+    """Count on, but send the same content."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         at = bus.sent(message, time)
@@ -306,7 +306,8 @@ def stale(message: str) -> Fault:
 
 
 def foreign_load() -> Fault:
-    """Frames of other identifiers, among them those that the firmware itself sends, as many as the bus can carry."""
+    """Return frames of other identifiers, among them those that the firmware itself sends, as many as the bus can
+    carry."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         inputs = [codec.message(name).frame_id for name in (*SAMPLES, "COMMAND", "IDENTITY")]
@@ -320,7 +321,7 @@ def foreign_load() -> Fault:
 
 
 def babble(every: int) -> Fault:
-    """Another node sends random data with the identifiers of our inputs."""
+    """Return another node sends random data with the identifiers of our inputs."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         inputs = [codec.message(name).frame_id for name in (*SAMPLES, "COMMAND")]
@@ -333,7 +334,7 @@ def babble(every: int) -> Fault:
 
 
 def duplicate() -> Fault:
-    """A second estimator: its IDENTITY each second."""
+    """Return a second estimator: its IDENTITY each second."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         at = bus.samples(time)[:: round(1.0 / bus.period)]

@@ -29,7 +29,7 @@ _NAMES = {"f_n": "natural frequency [Hz]", "zeta": "damping ratio", "m_p": "m_p 
 
 
 def build(results: Sequence[Result], seeds: int) -> str:
-    """The whole page."""
+    """Return the whole page."""
     page = Page(
         "Faults of bus, senders and sensors",
         f"{seeds} random pilot{'s' if seeds > 1 else ''} a fault, the worst of them. The fault lasts from 15 to 25 s "
@@ -88,7 +88,7 @@ def _section(page: Page, result: Result) -> None:
 
 
 def _chart(shown: Excerpt, result: Result) -> Figure:
-    """What was longest wrong, over time; dots at the foot where a flag says so."""
+    """Return what was longest wrong, over time; dots at the foot where a flag says so."""
     low, high = shown.value - SIGMAS * shown.sigma, shown.value + SIGMAS * shown.sigma
     values = np.concatenate((shown.truth, shown.value[np.isfinite(shown.value)]))
     floor, ceiling = 0.8 * float(np.percentile(values, 1.0)), 1.2 * float(np.percentile(values, 99.0))

@@ -81,7 +81,7 @@ class Verdict:
     """Of what was longest wrong without a flag."""
 
     def hold(self, name: str, value: float, most: float) -> None:
-        """Notes a figure and whether it keeps its limit; NaN does not."""
+        """Note a figure and whether it keeps its limit; NaN does not."""
         self.measured[name] = value
         if not value <= most:
             self.broken.append(name)
@@ -152,7 +152,7 @@ def _judge_torque(must: Must, record: Record, begin: int, end: int, verdict: Ver
 
 
 def _back(away: BoolArray, end: int) -> float:
-    """Seconds from the end of the fault until the firmware has been back for CALM."""
+    """Return seconds from the end of the fault until the firmware has been back for CALM."""
     after = away[end:]
     calm = round(CALM / PERIOD)
     if len(after) < calm:
@@ -193,7 +193,7 @@ def _excerpt(
 
 
 def deviation(record: Record, truth: Mapping[str, FloatArray], name: str) -> FloatArray:
-    """Size of the error in standard deviations that the firmware states."""
+    """Return size of the error in standard deviations that the firmware states."""
     value, sigma = _stated(record, name)
     with np.errstate(all="ignore"):
         size: FloatArray = np.abs(value - truth[name]) / sigma

@@ -34,7 +34,7 @@ class Result:
         return self.worst("silent") >= SILENT
 
     def worst(self, figure: str) -> float:
-        """Of all flights."""
+        """Return the worst of all flights."""
         return max(verdict.measured[figure] for verdict in self.verdicts)
 
     @property
@@ -49,7 +49,7 @@ class Result:
 
 
 def run(rows: Iterable[Row], seeds: int, show: Show) -> list[Result]:
-    """The results, in the order of the rows."""
+    """Return the results, in the order of the rows."""
     chosen = list(rows)
     verdicts: list[list[Verdict]] = [[] for _ in chosen]
     for seed in range(seeds):
@@ -60,7 +60,7 @@ def run(rows: Iterable[Row], seeds: int, show: Show) -> list[Result]:
 
 
 def flights(rows: Sequence[Row], pilot: Pilot) -> Iterator[Verdict]:
-    """Each row flown by a pilot."""
+    """Yield each row flown by a pilot."""
     config = Config()
     plain: dict[tuple[bool, bool], Record] = {}
     for row in rows:

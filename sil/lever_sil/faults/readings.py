@@ -59,7 +59,7 @@ def nothing(readings: Readings, during: Indices) -> None:
 
 
 def stuck(signal: str) -> Fault:
-    """The last value stays."""
+    """Hold the last value."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         readings.of[signal].source[during] = max(0, during[0] - 1)
@@ -68,7 +68,7 @@ def stuck(signal: str) -> Fault:
 
 
 def reads(signal: str, value: float) -> Fault:
-    """It has this value, whatever is true."""
+    """Return a fault: the signal has this value, whatever is true."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         readings.of[signal].factor[during], readings.of[signal].error[during] = 0.0, value
@@ -77,7 +77,7 @@ def reads(signal: str, value: float) -> Fault:
 
 
 def scaled(signal: str, factor: float) -> Fault:
-    """Its gain changes by this factor."""
+    """Return its gain changes by this factor."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         readings.of[signal].factor[during] *= factor
@@ -86,7 +86,7 @@ def scaled(signal: str, factor: float) -> Fault:
 
 
 def gain_drift(signal: str, factor: float) -> Fault:
-    """Its gain goes to this factor, at a steady rate."""
+    """Return its gain goes to this factor, at a steady rate."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         readings.of[signal].factor[during] *= np.linspace(1.0, factor, len(during))
@@ -95,7 +95,7 @@ def gain_drift(signal: str, factor: float) -> Fault:
 
 
 def step(signal: str) -> Fault:
-    """An offset comes at once."""
+    """Add an offset at once."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         readings.of[signal].error[during] += STEP[signal]
@@ -104,7 +104,7 @@ def step(signal: str) -> Fault:
 
 
 def drift(signal: str) -> Fault:
-    """An offset grows to the same."""
+    """Return an offset grows to the same."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         readings.of[signal].error[during] += STEP[signal] * np.linspace(0.0, 1.0, len(during))
@@ -113,7 +113,7 @@ def drift(signal: str) -> Fault:
 
 
 def spikes(signal: str) -> Fault:
-    """One value in a hundred is far off."""
+    """Put one value in a hundred far off."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         hit = during[readings.random.random(len(during)) < 0.01]
@@ -123,7 +123,8 @@ def spikes(signal: str) -> Fault:
 
 
 def clock(change: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Fault:
-    """The sender's time goes otherwise: from the time since the fault began [s] to what the sender says of it."""
+    """Change the sender's time: from the time since the fault began [s] to what the sender says of
+    it."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         start = readings.time_us[during[0]]
@@ -143,5 +144,5 @@ def clock_offset(seconds: float) -> Fault:
 
 
 def clock_wraps(readings: Readings, during: Indices) -> None:
-    """The time passes 2^32 us."""
+    """Let the time pass 2^32 us."""
     readings.time_us += (1 << 32) - readings.time_us[during[0]]

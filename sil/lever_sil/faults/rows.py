@@ -96,7 +96,7 @@ def _refused(message: str) -> Must:
 
 
 def _first(share: float) -> int:
-    """Samples in which something that happens to this share at random has happened, but for one in a million."""
+    """Return samples in which something that happens to this share at random has happened, but for one in a million."""
     return math.ceil(math.log(1e-6) / math.log(1.0 - share))
 
 
@@ -321,7 +321,7 @@ def _clocks() -> Iterator[Row]:
 
 
 def _frozen(row: Row) -> Row:
-    """The same while the parameters are held, which hides no fault."""
+    """Return the same rows while the parameters are held, which hides no fault."""
     mode = tuple(dict.fromkeys("frozen" if name in ("run", "coast") else name for name in row.must.mode))
     return replace(
         row,
@@ -333,8 +333,8 @@ def _frozen(row: Row) -> Row:
 
 
 def _from_power_on(row: Row) -> Row:
-    """The same fault from the first sample on, in ALIGN already. What is stuck shows half a second after ALIGN at the
-    latest; what only the innovations show, any way, two seconds after the first that may be judged."""
+    """Return the same fault from the first sample on, in ALIGN already. What is stuck shows half a second after
+    ALIGN at the latest; what only the innovations show, any way, two seconds after the first that may be judged."""
     must, wrong = row.must, row.must.within == _WRONG
     later = _JUDGED if wrong else _ALIGNED if row.must.within == _STUCK else 0
     flags = (*must.flags, "BASE", "MISMATCH", "INNOVATION", "CALIBRATION") if wrong else must.flags
@@ -348,15 +348,15 @@ def _from_power_on(row: Row) -> Row:
 
 
 def _failing() -> Iterator[Row]:
-    """Signals that fail for good."""
+    """Yield signals that fail for good."""
     kinds = ("invalid", "saturated", "stuck", "zero", "sign")
     names = {f"{signal}_{kind}" for signal in _SIGNAL if signal != "grip_force" for kind in kinds}
     yield from (row for row in _readings() if row.name in names)
 
 
 def _coasting() -> Iterator[Row]:
-    """Faults of the base acceleration while no lever signal comes, for its own stillness is all that shows them. Torque
-    has ended, and cannot be compared."""
+    """Yield faults of the base acceleration while no lever signal comes, for its own stillness is all that shows
+    them. Torque has ended, and cannot be compared."""
     must = replace(_BLIND, flags=("BASE",), within=_STUCK)
     faults = {"stuck": ("stuck", readings.stuck("z_ddot")), "zero": ("zero", readings.reads("z_ddot", 0.0))}
     for name, (words, spoil) in faults.items():

@@ -24,12 +24,12 @@ def state(result: Result) -> str:
 
 
 def missed(result: Result) -> str:
-    """What it does not keep."""
+    """Return what it does not keep."""
     return ", ".join(_WORD.get(what, what) for what in result.broken)
 
 
 def demands(must: judge.Must) -> str:
-    """What a row demands, in short."""
+    """Return what a row demands, in short."""
     parts = []
     if must.unaffected:
         parts.append("not a bit changes")
@@ -62,7 +62,7 @@ def lines(results: Sequence[Result]) -> list[Row]:
 
 
 def _whole(result: Result, figure: str) -> str:
-    """A figure that not all rows have."""
+    """Return a figure that not all rows have."""
     if not result.row.must.flags:
         return ""
     value = result.worst(figure)
@@ -92,8 +92,8 @@ def rows(results: Sequence[Result]) -> list[dict[str, Any]]:
 
 
 def counts(results: Sequence[Result]) -> dict[str, int]:
-    """How many rows there are, how many miss what they must, how many of these are not known to, and in how many the
-    firmware was silently wrong."""
+    """Return how many rows there are, how many miss what they must, how many of these are not known to, and in how
+    many the firmware was silently wrong."""
     return {
         "count": len(results),
         "missed": sum(bool(result.broken) for result in results),
@@ -103,5 +103,5 @@ def counts(results: Sequence[Result]) -> dict[str, int]:
 
 
 def unexpected(results: Sequence[Result]) -> list[str]:
-    """Rows that miss what they must, and are not known to."""
+    """Return rows that miss what they must, and are not known to."""
     return [result.row.name for result in results if result.broken and result.row.name not in KNOWN]

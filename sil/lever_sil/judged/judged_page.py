@@ -23,7 +23,7 @@ _STYLE = """
 
 
 def build(page: Page, results: Sequence[Result], charts: Sequence[Figure | None], note: str) -> str:
-    """The whole page, with a chart for each result; `note` explains the figures."""
+    """Return the whole page, with a chart for each result; `note` explains the figures."""
     page.section(
         "table", "Table", "Measured values against their limits", _table(lines(results)), _legend(results, note)
     )

@@ -15,7 +15,7 @@ Values = FloatArray
 
 
 def mean(values: Values) -> float:
-    """All runs as one number."""
+    """Return all runs as one number."""
     return float(np.mean(values))
 
 
@@ -40,7 +40,7 @@ class Limit:
     """Of the runs: "all" pooled, "median", "p90" or "worst"."""
 
     def holds(self, value: float) -> bool:
-        """Whether a value keeps it; NaN does not."""
+        """Return whether a value keeps it; NaN does not."""
         return (self.most is None or value <= self.most) and (self.least is None or value >= self.least)
 
     def __str__(self) -> str:
@@ -63,7 +63,7 @@ class Figure:
     """Where it is that much it may be more."""
 
     def worst(self, values: Values) -> float:
-        """Of all runs."""
+        """Return the worst of all runs."""
         return float(values.max() if self.more_is_worse else values.min())
 
     def p90(self, values: Values) -> float:
@@ -74,7 +74,7 @@ class Figure:
         return float(best_first[math.ceil(0.9 * len(values)) - 1])
 
     def over(self, values: Values, runs: str) -> float:
-        """All runs as one number, as `over` of a limit says."""
+        """Return all runs as one number, as `over` of a limit says."""
         if runs == "median":
             return float(np.median(values))
         return {"all": self.pool, "p90": self.p90, "worst": self.worst}[runs](values)
@@ -119,13 +119,13 @@ class Result:
     """What each run was, where that has a name."""
 
     def of(self, limit: Limit) -> float:
-        """What is held against a limit; NaN without runs."""
+        """Return what is held against a limit; NaN without runs."""
         if limit.figure not in self.values:
             return math.nan
         return self.known[limit.figure].over(self.values[limit.figure], limit.over)
 
     def worst_run(self, figure: str) -> str | None:
-        """The name of the run in which a figure was worst."""
+        """Return the name of the run in which a figure was worst."""
         if not self.runs:
             return None
         values = self.values[figure]

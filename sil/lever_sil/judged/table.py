@@ -16,14 +16,14 @@ COLUMNS = {"all runs": "all", "median": "median", "p90": "p90", "worst": "worst"
 
 
 def state(result: Result) -> str:
-    """Whether its limits hold, in a word."""
+    """Return whether its limits hold, in a word."""
     if result.ok:
         return HOLDS if result.condition.limits else REPORTED
     return MISSED
 
 
 def lines(results: Sequence[Result]) -> list[Row]:
-    """A line for each figure that has a limit, or for all where none has; the condition stands on its first."""
+    """Return a line for each figure that has a limit, or for all where none has; the condition stands on its first."""
     rows: list[Row] = []
     for result in results:
         everything = figures(result)
@@ -34,7 +34,7 @@ def lines(results: Sequence[Result]) -> list[Row]:
 
 
 def figures(result: Result) -> list[Row]:
-    """A line for each figure of a condition."""
+    """Return a line for each figure of a condition."""
     return [_line(result, name) for name in result.condition.figures] if result.values else [_problem(result)]
 
 
@@ -65,14 +65,14 @@ def _problem(result: Result) -> Row:
 
 
 def limit_text(result: Result, name: str) -> str:
-    """The limits of a figure; those that do instead of the others come after "or"."""
+    """Return the limits of a figure; those that do instead of the others come after "or"."""
     own = ", ".join(str(limit) for limit in result.condition.limits if limit.figure == name)
     instead = ", ".join(f"or {limit}" for limit in result.condition.unless if limit.figure == name)
     return "; ".join(part for part in (own, instead) if part)
 
 
 def rows(results: Sequence[Result]) -> list[dict[str, Any]]:
-    """A row for each condition, as JSON has it: what is held against the limits, and all figures of all runs."""
+    """Return a row for each condition, as JSON has it: what is held against the limits, and all figures of all runs."""
     return [_row(result) for result in results]
 
 

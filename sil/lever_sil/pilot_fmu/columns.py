@@ -20,13 +20,13 @@ _MEMBERS = ("plant", "cabin", "sensor", "base", "no_lever", "no_base", "torque",
 
 
 def truths(scenario: Scenario) -> list[str]:
-    """Names of the true values that a pilot has, in the order of the columns."""
+    """Return names of the true values that a pilot has, in the order of the columns."""
     truth = scenario_inputs.prepare(scenario).truth
     return [*truth.parameters, *vars(truth.dynamics)]
 
 
 def packed(scenario: Scenario) -> bytes:
-    """The content of the file. Raises LeverError for a pilot whose plant the C does not have."""
+    """Return the content of the file. Raise LeverError for a pilot whose plant the C does not have."""
     inputs = scenario_inputs.prepare(scenario)
     loop = Loop(scenario, inputs, by_frames=True, every=len(inputs.time))
     truth = [*inputs.truth.parameters.values(), *vars(inputs.truth.dynamics).values()]
@@ -52,7 +52,7 @@ def _padded(data: bytes) -> bytes:
 
 
 def _dither(scenario: Scenario, time: FloatArray) -> FloatArray:
-    """What the estimator is asked for at each sample [N m]."""
+    """Return what the estimator is asked for at each sample [N m]."""
     asked = np.zeros_like(time)
     for sample, values in sorted(scenario_inputs.commands(scenario, time).items()):
         if "dither_rms" in values:
@@ -61,7 +61,7 @@ def _dither(scenario: Scenario, time: FloatArray) -> FloatArray:
 
 
 def _pointers(loop: Any) -> Iterator[tuple[int, int]]:
-    """Offset in loop_t, and address, of each pointer to an array that is not NULL."""
+    """Yield offset in loop_t, and address, of each pointer to an array that is not NULL."""
     fields = dict(ffi.typeof("loop_t").fields)
     for name in _MEMBERS:
         yield from _pointers_in(getattr(loop, name), fields[name].type, fields[name].offset)

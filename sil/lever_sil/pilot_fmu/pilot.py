@@ -22,7 +22,7 @@ _CAN = ("can/e2e.c", "can/layout.c", "can/messages.c", "can/messages_sample.c")
 
 
 def pilot(scenarios: Sequence[Scenario]) -> Contents:
-    """What is in the FMU of a scenario, given once for each seed. Raises LeverError."""
+    """Return what is in the FMU of a scenario, given once for each seed. Raise LeverError."""
     first = scenarios[0]
     seeds = [scenario.seed for scenario in scenarios]
     names = truths(first)

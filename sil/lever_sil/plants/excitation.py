@@ -33,10 +33,10 @@ class Excitation(ABC):
         self.check()
 
     def check(self) -> None:  # noqa: B027 (most kinds have nothing to check)
-        """Raises ValueError when fields contradict each other."""
+        """Raise ValueError when fields contradict each other."""
 
     def samples(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """The signal at the evenly spaced times `time` [s]."""
+        """Return the signal at the evenly spaced times `time` [s]."""
         first, last = np.searchsorted(time, (self.start, self.end))
         signal = np.zeros_like(time)
         if first < last:
@@ -45,7 +45,7 @@ class Excitation(ABC):
 
     @abstractmethod
     def scaled(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """The signal inside its window; `time` [s] counts from the first sample in it."""
+        """Return the signal inside its window; `time` [s] counts from the first sample in it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,7 @@ class Normalised(Excitation):
 
     @abstractmethod
     def waveform(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """The signal but for its scale."""
+        """Return the signal but for its scale."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,7 +183,7 @@ class Pulses(Excitation):
 
 
 def autoregressive(noise: FloatArray, left: float) -> FloatArray:
-    """The process x[k] = left x[k - 1] + noise[k] along the first axis, from x[0] = noise[0]."""
+    """Return the process x[k] = left x[k - 1] + noise[k] along the first axis, from x[0] = noise[0]."""
     return np.array(list(accumulate(noise, lambda last, new: left * last + new)))
 
 
@@ -201,7 +201,7 @@ read_excitation = read_kind(KINDS)
 
 
 def total(excitations: Sequence[Excitation], time: FloatArray, rngs: Sequence[np.random.Generator]) -> FloatArray:
-    """The sum of `excitations` at the times `time` [s], each with its own random stream of `rngs`."""
+    """Return the sum of `excitations` at the times `time` [s], each with its own random stream of `rngs`."""
     signal = np.zeros_like(time)
     for excitation, rng in zip(excitations, rngs, strict=True):
         signal += excitation.samples(time, rng)

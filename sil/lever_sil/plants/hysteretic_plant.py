@@ -47,7 +47,7 @@ class Power:
 
     @classmethod
     def of(cls, loss_factor: float) -> Power:
-        """The one with this loss factor."""
+        """Return the one with this loss factor."""
         power = 2.0 / math.pi * math.atan(loss_factor)
         width = math.log(_RATES[1] / _RATES[0])
         scale = math.sin(power * math.pi) / math.pi / math.cos(0.5 * power * math.pi)
@@ -91,7 +91,7 @@ class Hysteretic(Truth):
         return dominant_dynamics(self, self.m_p, self.k_p, self.trim)
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
-        """That of the spring and the damper, with the elements in its denominator."""
+        """Return that of the spring and the damper, with the elements in its denominator."""
         alone = lever_plant.LeverTruth(self.lever, self.arm, "trim").transfer(samples)
         gain = self.k_p[samples, None] * (self.lever.lever_length * np.cos(self.trim[samples, None])) ** 2
         every = np.poly(-_RATES)
@@ -138,7 +138,7 @@ _Row = tuple[float, float, float, float, float, list[list[float]]]
 
 
 def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_Row]:
-    """The sample periods between the samples, in order."""
+    """Yield the sample periods between the samples, in order."""
     for block in conditions.blocks():
         at = block.periods
         drive = np.stack((block.z_ddot, columns[0][at, None] * block.kick + block.push), axis=2).tolist()
@@ -162,7 +162,7 @@ class Plant:
         self._rows = _rows(coefficients(truth), conditions)
 
     def advance(self, command: float) -> None:
-        """To the next sample, with the torque `command` [N m] held. Raises StopIteration after the last sample."""
+        """To the next sample, with the torque `command` [N m] held. Raise StopIteration after the last sample."""
         theta, theta_dot, torque = self.theta, self.theta_dot, self.tau_m - command
         mass, moment, k_p, rest_sine, rest, drive = next(self._rows)
         lever, step, power = self._lever, self._step, self._power

@@ -91,8 +91,8 @@ def moment(lever: Lever, truth: Truth) -> FloatArray:
 
 
 def preload(lever: Lever, truth: Truth, kind: Preload) -> tuple[FloatArray, FloatArray]:
-    """(torque by which arm's preload and weight turn the lever, per cosine [N m]; theta_l): l^2 k_p sin theta_a -
-    g l mu."""
+    """Return (torque by which arm's preload and weight turn the lever, per cosine [N m]; theta_l): l^2 k_p sin
+    theta_a - g l mu."""
     arm = lever.lever_length**2 * truth.k_p
     if kind == "trim":
         return arm * np.sin(truth.trim), truth.trim
@@ -101,7 +101,7 @@ def preload(lever: Lever, truth: Truth, kind: Preload) -> tuple[FloatArray, Floa
 
 
 def weight(kind: Preload) -> float:
-    """What gravity [m/s^2] the lever's own mass feels: in preload trim a balance carries it."""
+    """Return what gravity [m/s^2] the lever's own mass feels: in preload trim a balance carries it."""
     return GRAVITY if kind == "fixed" else 0.0
 
 
@@ -121,7 +121,8 @@ def damping(lever: Lever, truth: Truth, angle: FloatArray) -> FloatArray:
 
 
 def equilibrium(lever: Lever, truth: Truth, kind: Preload) -> FloatArray:
-    """The angle at which the lever rests [rad]: the trim, or with fixed preload where springs and weight balance."""
+    """Return the angle at which the lever rests [rad]: the trim, or with fixed preload where springs and weight
+    balance."""
     if kind == "trim":
         return truth.trim
     hold, lever_angle = preload(lever, truth, kind)
@@ -142,7 +143,7 @@ def dynamics(lever: Lever, truth: Truth, kind: Preload) -> Dynamics:
 
 
 def resistance(lever: Lever, rate: float) -> tuple[float, float]:
-    """Torque [N m] by which the lever's own damper and friction resist, and its slope [N m s/rad]."""
+    """Return torque [N m] by which the lever's own damper and friction resist, and its slope [N m s/rad]."""
     torque, slope = lever.lever_damping * rate, lever.lever_damping
     if lever.lever_friction > 0.0:
         speed = math.sqrt(rate * rate + STOP_RATE * STOP_RATE)
@@ -209,7 +210,7 @@ _Row = tuple[float, float, float, float, float, float, list[list[float]]]
 
 
 def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_Row]:
-    """The sample periods between the samples, in order."""
+    """Yield the sample periods between the samples, in order."""
     for block in conditions.blocks():
         at = block.periods
         drive = np.stack((block.z_ddot, columns[0][at, None] * block.kick, block.push), axis=2).tolist()
@@ -235,7 +236,7 @@ class Plant:
         self._rows = _rows(coefficients(lever, truth, kind), conditions)
 
     def advance(self, command: float, reflex: float = 0.0) -> None:
-        """To the next sample, with the torque `command` and one of the arm [N m] held. Raises StopIteration after the
+        """To the next sample, with the torque `command` and one of the arm [N m] held. Raise StopIteration after the
         last sample."""
         theta, theta_dot, torque = self.theta, self.theta_dot, self.tau_m - command
         mass, moment, arm_damping, arm_stiffness, hold, lever_angle, drive = next(self._rows)
@@ -269,8 +270,8 @@ class Plant:
     def _force_on_lever(
         self, begin: float, begin_dot: float, drive: list[list[float]], lever_angle: float, motor: float
     ) -> float:
-        """Mean force of the hand [N] since the lever was at `begin` with the rate `begin_dot`, to second order in the
-        period."""
+        """Return mean force of the hand [N] since the lever was at `begin` with the rate `begin_dot`, to second
+        order in the period."""
         lever, period = self._lever, self._step * len(drive)
         middle = 0.5 * (begin + self.theta)
         acceleration, kick, push = (sum(column) for column in zip(*drive, strict=True))

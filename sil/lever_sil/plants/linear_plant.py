@@ -69,7 +69,7 @@ class LinearTruth(Truth):
         return Plant(self.system, self.felt(conditions))
 
     def felt(self, conditions: Conditions) -> Conditions:
-        """The conditions with the base acceleration that drives the system."""
+        """Return the conditions with the base acceleration that drives the system."""
         return conditions
 
 
@@ -117,7 +117,7 @@ _Row = tuple[float, float, float, float, list[list[float]]]
 
 
 def _rows(system: System, conditions: Conditions) -> Iterator[_Row]:
-    """The sample periods between the samples, in order."""
+    """Yield the sample periods between the samples, in order."""
     columns = (system.stiffness, system.damping, system.compliance, system.rest)
     for block in conditions.blocks():
         at = block.periods
@@ -139,7 +139,7 @@ class Plant:
         self._rows = _rows(system, conditions)
 
     def advance(self, command: float) -> None:
-        """To the next sample, with the torque `command` [N m] held. Raises StopIteration after the last sample."""
+        """To the next sample, with the torque `command` [N m] held. Raise StopIteration after the last sample."""
         theta, theta_dot, torque = self.theta, self.theta_dot, self.tau_m - command
         stiffness, damping, compliance, rest, drive = next(self._rows)
         step, lag_middle, lag = self._step, self._lag_middle, self._lag

@@ -43,17 +43,17 @@ class Pilot(ABC):
             raise ValueError("'trim' goes with preload trim; with fixed preload the lever rests where torques balance")
 
     def trajectories(self) -> Mapping[str, Trajectory]:
-        """How the parameters go, by name."""
+        """Return how the parameters go, by name."""
         return {name: getattr(self, name) for name in self.signs}
 
     def changes(self) -> set[float]:
-        """Times [s] at which they jump."""
+        """Return times [s] at which they jump."""
         return {time for trajectory in self.trajectories().values() for time in trajectory.changes()}
 
     def truth(self, time: FloatArray, stream: Callable[[str], np.random.Generator], lever: lever_plant.Lever) -> Truth:
-        """The pilot on `lever` at the times [s]; `stream` gives the random numbers of a parameter.
+        """Return the pilot on `lever` at the times [s]; `stream` gives the random numbers of a parameter.
 
-        Raises ValueError for a parameter that loses its sign, or a trim beyond the vertical.
+        Raise ValueError for a parameter that loses its sign, or a trim beyond the vertical.
         """
         values = {name: each.values(time, stream(name)) for name, each in self.trajectories().items()}
         for name, sign in self.signs.items():
@@ -72,7 +72,7 @@ class Pilot(ABC):
     def build(
         self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
     ) -> Truth:
-        """The truth with these parameters and trim angles at the times [s]."""
+        """Return the truth with these parameters and trim angles at the times [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -84,7 +84,7 @@ class Reflex(Truth):
 
 
 def _pade(power: int) -> float:
-    """Coefficient of (s T)^power in the denominator of Pade's approximation of exp(-s T)."""
+    """Return coefficient of (s T)^power in the denominator of Pade's approximation of exp(-s T)."""
     factorial = math.factorial
     whole = factorial(2 * _ORDER) * factorial(power) * factorial(_ORDER - power)
     return factorial(2 * _ORDER - power) * factorial(_ORDER) / whole
@@ -100,7 +100,7 @@ def coefficients(truth: Reflex) -> tuple[FloatArray, ...]:
 
 
 def late(truth: Reflex, period: float) -> float:
-    """The delay after the middle of a sample period, in such periods."""
+    """Return the delay after the middle of a sample period, in such periods."""
     return truth.delay / period - 0.5
 
 
@@ -115,7 +115,7 @@ class Plant(lever_plant.Plant):
         self._forces: list[float] = []
 
     def advance(self, command: float, reflex: float = 0.0) -> None:
-        """To the next sample, with the torques `command` and `reflex` [N m], beside its own, held. Raises StopIteration
+        """To the next sample, with the torques `command` and `reflex` [N m], beside its own, held. Raise StopIteration
         after the last sample."""
         length = self._lever.lever_length
         k_r, c_r, rest_sine = self._grip[len(self._forces)].tolist()

@@ -31,7 +31,7 @@ class Corruption:
     offset: FloatArray
 
     def of(self, readings: FloatArray) -> FloatArray:
-        """All readings with the faults in them."""
+        """Return all readings with the faults in them."""
         return self.factor * readings[self.source] + self.offset
 
 
@@ -48,7 +48,7 @@ class Fault(ABC):
 
     @abstractmethod
     def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
-        """Adds the fault to `corruption` at the samples `inside`, at least one."""
+        """Add the fault to `corruption` at the samples `inside`, at least one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,20 +95,20 @@ class Sensor:
     fault: tuple[Fault, ...] = tables(read_kind(FAULTS))
 
     def offsets(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """What is added to `count` samples: bias and noise."""
+        """Return what is added to `count` samples: bias and noise."""
         offsets: FloatArray = rng.standard_normal(count)
         offsets *= self.noise
         offsets += self.bias
         return offsets
 
     def lag(self, period: float) -> tuple[int, float]:
-        """The delay as whole sample periods and the part of one beyond, for linear interpolation."""
+        """Return the delay as whole sample periods and the part of one beyond, for linear interpolation."""
         samples = self.delay / period
         whole = math.floor(samples + 1e-9)
         return whole, max(0.0, samples - whole)
 
     def measure(self, signal: FloatArray, period: float, rng: np.random.Generator) -> FloatArray:
-        """All samples of a `signal` that is known beforehand; before its start it had its first value."""
+        """Return all samples of a `signal` that is known beforehand; before its start it had its first value."""
         whole, part = self.lag(period)
         delayed = signal
         if whole or part:
@@ -117,7 +117,7 @@ class Sensor:
         return (1.0 + self.gain_error) * delayed + self.offsets(len(signal), rng)
 
     def corruption(self, time: FloatArray, rng: np.random.Generator) -> Corruption:
-        """What its faults do at the times `time` [s]."""
+        """Return what its faults do at the times `time` [s]."""
         count = len(time)
         corruption = Corruption(np.arange(count), np.ones(count), np.zeros(count))
         for fault in self.fault:
@@ -138,7 +138,7 @@ class Dropout:
     end: float = quantity("s", math.inf, above=0.0)
 
     def missing(self, time: FloatArray, period: float, rng: np.random.Generator) -> BoolArray:
-        """True at the samples `time` [s] that are missing: Gilbert's two states, geometric bursts and pauses."""
+        """Return True at the samples `time` [s] that are missing: Gilbert's two states, geometric bursts and pauses."""
         inside = (time >= self.start) & (time < self.end)
         if self.share == 1.0:
             return inside
@@ -169,7 +169,7 @@ class Sensors:
 def missing(
     dropouts: Sequence[Dropout], what: str, time: FloatArray, period: float, rngs: Sequence[np.random.Generator]
 ) -> BoolArray:
-    """True at the samples in which any of `dropouts` takes `what`; one random stream for each dropout."""
+    """Return True at the samples in which any of `dropouts` takes `what`; one random stream for each dropout."""
     gone = np.zeros(len(time), dtype=np.bool_)
     for dropout, rng in zip(dropouts, rngs, strict=True):
         if dropout.what == what:

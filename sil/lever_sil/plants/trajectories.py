@@ -25,15 +25,15 @@ class Trajectory(ABC):
 
     @abstractmethod
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """The value at the evenly spaced times `time` [s]."""
+        """Return the value at the evenly spaced times `time` [s]."""
 
     def changes(self) -> tuple[float, ...]:
-        """Times [s] of the jumps, after which an estimator has to find the value anew."""
+        """Return times [s] of the jumps, after which an estimator has to find the value anew."""
         return ()
 
 
 def check_rising(times: tuple[float, ...]) -> None:
-    """Raises ValueError unless each time is later than the one before."""
+    """Raise ValueError unless each time is later than the one before."""
     if any(later <= earlier for earlier, later in pairwise(times)):
         raise ValueError("the times in 'at' do not rise")
 

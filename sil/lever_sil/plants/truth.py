@@ -69,11 +69,11 @@ class Conditions:
         return self.process_noise * math.sqrt(self.step)
 
     def decay(self, substeps: float) -> float:
-        """What is left after that many substeps of a difference between torque and command."""
+        """Return what is left after that many substeps of a difference between torque and command."""
         return math.exp(-substeps * self.step / self.motor_lag) if self.motor_lag > 0.0 else 0.0
 
     def blocks(self) -> Iterator[Block]:
-        """The periods between the samples in order, some thousand at a time."""
+        """Yield the periods between the samples in order, some thousand at a time."""
         disturbance = np.broadcast_to(self.disturbance, self.z_ddot.shape)
         last = len(self.z_ddot) - 1
         for begin in range(0, last, self.ahead):
@@ -86,7 +86,7 @@ class Conditions:
             )
 
     def middles(self, signal: FloatArray) -> FloatArray:
-        """A signal, given at the samples and linear between them, in the middle of each substep."""
+        """Return a signal, given at the samples and linear between them, in the middle of each substep."""
         part = (np.arange(self.count) + 0.5) / self.count
         middles: FloatArray = signal[:-1, None] + np.diff(signal)[:, None] * part
         return middles
@@ -119,7 +119,7 @@ class Body(Protocol):
     is not modelled."""
 
     def advance(self, command: float) -> None:
-        """To the next sample, with the torque `command` [N m] held. Raises StopIteration after the last sample."""
+        """To the next sample, with the torque `command` [N m] held. Raise StopIteration after the last sample."""
 
 
 class Truth(ABC):
@@ -154,16 +154,16 @@ class Truth(ABC):
 
     @abstractmethod
     def body(self, conditions: Conditions) -> Body:
-        """The lever at the first sample."""
+        """Return the lever at the first sample."""
 
     def at(self, samples: slice) -> Truth:
-        """The same at some of its samples only."""
+        """Return the same at some of its samples only."""
         part: Truth = _part(self, samples)
         return part
 
 
 def _part(value: Any, samples: slice) -> Any:
-    """These samples of every array in a dataclass, and in those that it holds."""
+    """Return these samples of every array in a dataclass, and in those that it holds."""
     parts = {}
     for each in fields(value):
         own = getattr(value, each.name)
@@ -175,8 +175,8 @@ def _part(value: Any, samples: slice) -> Any:
 
 
 def dominant_dynamics(truth: Truth, *columns: FloatArray) -> Dynamics:
-    """Those of the dominant mode of its transfer function, worked out only where one of its `columns` has changed:
-    eigenvalues take long."""
+    """Return those of the dominant mode of its transfer function, worked out only where one of its `columns` has
+    changed: eigenvalues take long."""
     new = np.append(True, np.any(np.diff(np.stack(columns), axis=1) != 0.0, axis=0))
     frequency, ratio = truth.transfer(np.flatnonzero(new)).dominant_mode()
     held = np.cumsum(new) - 1

@@ -92,7 +92,7 @@ class TwoDof(Truth):
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
-    """The products of polynomials of second order, row by row."""
+    """Return the products of polynomials of second order, row by row."""
     product = np.zeros((len(left), 5))
     for power in range(3):
         product[:, power : power + 3] += left[:, power, None] * right
@@ -111,7 +111,7 @@ _Row = tuple[float, float, float, float, float, float, float, float, float, list
 
 
 def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_Row]:
-    """The sample periods between the samples, in order."""
+    """Yield the sample periods between the samples, in order."""
     for block in conditions.blocks():
         at = block.periods
         drive = np.stack((block.z_ddot, columns[0][at, None] * block.kick + block.push), axis=2).tolist()
@@ -134,7 +134,7 @@ class Plant:
         self._rows = _rows(coefficients(truth), conditions)
 
     def advance(self, command: float) -> None:
-        """To the next sample, with the torque `command` [N m] held. Raises StopIteration after the last sample."""
+        """To the next sample, with the torque `command` [N m] held. Raise StopIteration after the last sample."""
         theta, theta_dot, s, s_dot, torque = self.theta, self.theta_dot, self.s, self.s_dot, self.tau_m - command
         inertia, moment, m_t, c_p, k_p, c_t, k_t, rest_sine, rest, drive = next(self._rows)
         step, lag_middle, lag = self._step, self._lag_middle, self._lag

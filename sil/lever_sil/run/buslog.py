@@ -37,7 +37,8 @@ class Frames:
 
 
 def lines(frames: Frames, channel: str) -> Iterator[bytes]:
-    """The log in pieces; lines whose seconds have the same number of digits have the same length and go together."""
+    """Yield the log in pieces; lines whose seconds have the same number of digits have the same length and go
+    together."""
     seconds = frames.time_us // 1_000_000
     digits = np.char.str_len(seconds.astype(np.str_)) if len(frames) else np.zeros(0, dtype=np.int64)
     edges = np.flatnonzero(np.diff(digits)) + 1
@@ -47,7 +48,7 @@ def lines(frames: Frames, channel: str) -> Iterator[bytes]:
 
 
 def _equal_lines(frames: Frames, part: NDArray[np.intp], digits: int, channel: str) -> bytes:
-    """The lines of the frames `part`, all with `digits` digits in the seconds, as one matrix of characters."""
+    """Return the lines of the frames `part`, all with `digits` digits in the seconds, as one matrix of characters."""
     template = f"({'0' * digits}.000000) {channel} 000#{'0' * 16} T\n".encode()
     text = np.tile(np.frombuffer(template, dtype=np.uint8), (len(part), 1))
     stamp = frames.time_us[part]

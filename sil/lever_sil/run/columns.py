@@ -31,7 +31,7 @@ _AT_ONCE = 1000
 
 
 def columns_of(recording: Recording, frames: Frames) -> Trace:
-    """The columns of trace.csv, in order."""
+    """Return the columns of trace.csv, in order."""
     sample = recording.traffic.sample.astype(np.int64)
     count = len(recording.inputs.time)
     decoded = _Decoded(frames, sample, count, round(recording.scenario.period * 1e6))
@@ -73,7 +73,7 @@ def _truth(recording: Recording) -> Trace:
 
 
 def _true_margin(recording: Recording) -> FloatArray:
-    """Of the loop with the true arm [dB]."""
+    """Return the true margin of the loop with the true arm [dB]."""
     coupled, inputs = recording.scenario.aircraft, recording.inputs
     assert coupled is not None
     at = np.arange(0, len(inputs.time), _MARGIN_EVERY)
@@ -101,7 +101,7 @@ class _Decoded:
         return self._messages[name]
 
     def at_samples(self, message: str, field: str) -> FloatArray:
-        """The field at each sample; NaN without a frame or with a cleared validity bit."""
+        """Return the field at each sample; NaN without a frame or with a cleared validity bit."""
         sample, decoded = self._message(message)
         valid = decoded.get(f"{field}_valid", np.ones(len(sample)))
         column = np.full(self._count, np.nan)
@@ -109,7 +109,7 @@ class _Decoded:
         return column
 
     def held(self, message: str, field: str) -> FloatArray:
-        """The last value of the field at or before each sample; NaN before the first.
+        """Return the last value of the field at or before each sample; NaN before the first.
 
         Counts go on beyond their bits and start from 0, also if the firmware has counted in an earlier run.
         """

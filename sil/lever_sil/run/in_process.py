@@ -22,10 +22,10 @@ from .loop import Progress, Recording
 def run(
     scenario: Scenario, channel: str = "lever", progress: Progress | None = None, snapshots: float | None = None
 ) -> Recording:
-    """Runs `scenario`; `channel` names the estimator in errors, which sends its state each `snapshots` seconds. A pilot
+    """Run `scenario`; `channel` names the estimator in errors, which sends its state each `snapshots` seconds. A pilot
     whose plant the C does not have runs in Python.
 
-    Raises NoAnswerError when the firmware falls silent, RefusedError when it refuses a COMMAND.
+    Raise NoAnswerError when the firmware falls silent, RefusedError when it refuses a COMMAND.
     """
     inputs = prepare(scenario)
     if plants.has(inputs.truth):
@@ -74,7 +74,7 @@ def _identity(traffic: Traffic) -> Identity:
 
 
 def _refusal(traffic: Traffic) -> str:
-    """What the last COMMAND_ACK says."""
+    """Return what the last COMMAND_ACK says."""
     acknowledged = traffic.data[traffic.identifier == codec.message("COMMAND_ACK").frame_id]
     fields = codec.decode_columns("COMMAND_ACK", acknowledged[-1:])
     return refusal(result_of({name: float(column[0]) for name, column in fields.items()}))

@@ -59,7 +59,7 @@ class SimulationSource(Source):
         return values, truth.transfer(np.array([sample])).response(frequencies)[0]
 
     def hear(self, message: can.Message) -> None:
-        """A frame that passes on the bus of the simulation."""
+        """Take a frame that passes on the bus of the simulation."""
         self._put(as_frame(message))
 
     def _look_up(self, _done: int, _total: int) -> None:
@@ -68,7 +68,7 @@ class SimulationSource(Source):
 
 
 def open_source(name: str) -> tuple[Source, Config]:
-    """The pilot of a scenario and the configuration of its estimator. Raises ScenarioError."""
+    """Return the pilot of a scenario and the configuration of its estimator. Raise ScenarioError."""
     scenario = load(name)
     return SimulationSource(scenario), scenario.config
 

@@ -83,7 +83,7 @@ class Recording:
     """Whether the estimator is known to watch the scenario's aircraft, or to watch none where that has none."""
 
     def frames(self) -> Frames:
-        """All frames, with the time of their sample."""
+        """Return all frames, with the time of their sample."""
         period_us = round(self.scenario.period * 1e6)
         received = np.isin(self.traffic.identifier, list(_from_estimator()))
         time_us = self.traffic.sample.astype(np.int64) * period_us
@@ -113,7 +113,7 @@ class _Tape:
         return self.inputs.sensed
 
     def finished(self) -> Recording:
-        """The whole."""
+        """Return the whole."""
         data = np.frombuffer(bytes(self.data), dtype=np.uint8).reshape(-1, 8)
         return Recording(
             self.scenario,
@@ -136,10 +136,10 @@ def run(
     progress: Progress | None = None,
     commander: Commander | None = None,
 ) -> Recording:
-    """Runs `scenario` against the estimator on `bus`, as fast as that answers or paced by the wall clock.
-    One that comes from another run rests for REST first, off the record, so that one seed is one run on it, too.
+    """Run `scenario` against the estimator on `bus`, as fast as that answers or paced by the wall clock. One that comes
+    from another run rests for REST first, off the record, so that one seed is one run on it, too.
 
-    `commander`: of whoever else sends COMMAND on this bus. Raises NoAnswerError when nobody answers, RefusedError when
+    `commander`: of whoever else sends COMMAND on this bus. Raise NoAnswerError when nobody answers, RefusedError when
     the estimator refuses a COMMAND, and LeverError when it speaks another contract or has other settings.
     """
     inputs, alone = prepare(scenario), commander is None
@@ -156,8 +156,8 @@ def run(
 
 
 def _rest(link: _Link, scenario: Scenario, theta: float) -> None:
-    """Samples of a lever at rest, until the estimator, after a reset, is as a fresh one: up to a HEALTH, which clears
-    the faults that it has gathered."""
+    """Send samples of a lever at rest until the estimator, after a reset, is like a fresh one: up to a HEALTH, which
+    clears the faults that it has latched."""
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
     encode_lever, encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
     period_us = round(scenario.period * 1e6)
@@ -197,7 +197,7 @@ class _Link:
         self._incoming = _from_estimator()
 
     def sender(self, name: str) -> Callable[[int, bytes], None]:
-        """A function that sends a frame of the message `name`: called with the sample and the 8 bytes."""
+        """Return a function that sends a frame of the message `name`: called with the sample and the 8 bytes."""
         identifier = codec.message(name).frame_id
         message = can.Message(arbitration_id=identifier, is_extended_id=False, data=bytes(8))
         send, tape = self._bus.send, self._tape
@@ -212,8 +212,8 @@ class _Link:
         return send_frame
 
     def command(self, sample: int, values: Mapping[str, codec.Value]) -> None:
-        """Sends a COMMAND and waits until it is acknowledged. A run that has ended just before may have left the
-        sequence of its counter anywhere, so the first one is sent until it is in it. Raises LeverError."""
+        """Send a COMMAND and wait until it is acknowledged. A run that has just ended may have left the sequence
+        counter anywhere, so the first COMMAND is repeated until it is in sequence. Raise LeverError."""
         send = self.sender("COMMAND")
         for _ in range(1 if sample else 16):
             counter = self._commander.send(values, lambda _, data: send(sample, data))
@@ -226,7 +226,7 @@ class _Link:
             raise RefusedError(f"{self._bus.channel_info}: {refusal(str(result))}")
 
     def _acknowledged(self, sample: int, counter: int) -> str | None:
-        """What became of a COMMAND; None when that is not said in time."""
+        """Return what became of a COMMAND; None when that is not said in time."""
         timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
         while (frame := self._take(sample, timeout)) is not None:
             if frame[0] == self._acknowledgement:
@@ -240,8 +240,8 @@ class _Link:
         return None
 
     def answer(self, sample: int) -> tuple[float, float]:
-        """Takes what the estimator sends for this sample, up to its STATE_ESTIMATE; returns the torque that it asks for
-        and what it adds to the lever's angle."""
+        """Take what the estimator sends for this sample, up to its STATE_ESTIMATE; return the torque that it asks
+        for and what it adds to the lever's angle."""
         time_low = sample * self._period_us & 0xFFFF
         timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
         torque, correction = 0.0, 0.0
@@ -267,7 +267,7 @@ class _Link:
         return torque, correction
 
     def _take(self, sample: int, timeout: float) -> tuple[int, bytes | bytearray] | None:
-        """The next frame of the estimator, recorded; None when none comes in time."""
+        """Return the next frame of the estimator, recorded; None when none comes in time."""
         tape = self._tape
         while (message := self._bus.recv(timeout)) is not None:
             identifier, data = message.arbitration_id, message.data
@@ -284,8 +284,8 @@ class _Link:
         return None
 
     def _check_settings(self) -> None:
-        """Settings come by no frame: another process has its own. Raises SettingsError when they are not the
-        scenario's."""
+        """Check that the settings of the bus are the scenario's: no frame carries them. Raise SettingsError when
+        they are not."""
         scenario, says = self._tape.scenario, self._tape.identity.settings_crc
         if says not in (None, scenario.config.settings_crc):
             raise SettingsError(
@@ -303,20 +303,20 @@ class _Link:
 
 
 def _from_estimator() -> frozenset[int]:
-    """Identifiers of what an estimator sends."""
+    """Return identifier of what an estimator sends."""
     messages = codec.database().messages
     return frozenset(message.frame_id for message in messages if message.senders == ["ESTIMATOR"])
 
 
 def _signed_field(name: str, signal: str) -> Callable[[bytes | bytearray], float]:
-    """A fast reader of one signed, scaled field of an 8-byte frame, which is always available."""
+    """Return a fast reader of one signed, scaled field of an 8-byte frame, which is always available."""
     layout = codec.message(name).get_signal_by_name(signal)
     raw, scale, half = codec.raw_field(name, signal), float(layout.scale), 1 << (layout.length - 1)
     return lambda data: ((raw(data) ^ half) - half) * scale
 
 
 def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -> None:
-    """The samples, one after the other."""
+    """Send the samples, one after the other."""
     scenario, inputs = tape.scenario, tape.inputs
     count = len(inputs.time)
     cabin = flight(scenario, inputs)
@@ -360,8 +360,8 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
 
 
 def _advance(body: Body, cabin: Flight | None, inputs: Inputs) -> Callable[[int, float, float], None]:
-    """A function that takes lever and cabin from a sample to the next, with the torque [N m] held and what is added to
-    the lever's angle [rad]."""
+    """Return a function that takes lever and cabin from a sample to the next, with the torque [N m] held and what is
+    added to the lever's angle [rad]."""
     rest = body.theta
 
     def advance(sample: int, torque: float, correction: float) -> None:
@@ -374,7 +374,7 @@ def _advance(body: Body, cabin: Flight | None, inputs: Inputs) -> Callable[[int,
 
 
 def _reader_of(tape: _Tape, name: str) -> Callable[[int], float]:
-    """The reading of a signal of the lever at a sample, from the history up to it; NaN when invalid."""
+    """Return the reading of a signal of the lever at a sample, from the history up to it; NaN when invalid."""
     scenario = tape.scenario
     given = readings(scenario, tape.inputs, name)
     reader = _reader(given.sensor, getattr(tape, name), given.offsets.tolist(), scenario.period)
@@ -382,7 +382,7 @@ def _reader_of(tape: _Tape, name: str) -> Callable[[int], float]:
 
 
 def _grip_sender(tape: _Tape, link: _Link) -> Callable[[int], None] | None:
-    """Sends the GRIP_SAMPLE of a sample; None without that sensor."""
+    """Send the GRIP_SAMPLE of a sample; None without that sensor."""
     if tape.scenario.sensors.grip_force is None:
         return None
     read, send, encode = _reader_of(tape, "grip_force"), link.sender("GRIP_SAMPLE"), codec.encoder("GRIP_SAMPLE")
@@ -392,7 +392,7 @@ def _grip_sender(tape: _Tape, link: _Link) -> Callable[[int], None] | None:
 def _reader(
     sensor: sensors.Sensor, history: Sequence[float] | FloatArray, offsets: list[float], period: float
 ) -> Callable[[int], float]:
-    """A sensor of a signal that is known only up to now; as Sensor.measure() otherwise."""
+    """Return a sensor of a signal that is known only up to now; as Sensor.measure() otherwise."""
     gain = 1.0 + sensor.gain_error
     whole, part = sensor.lag(period)
     if whole == 0 and part == 0.0:
@@ -406,13 +406,13 @@ def _reader(
 
 
 def _corrupted(reader: Callable[[int], float], corruption: sensors.Corruption) -> Callable[[int], float]:
-    """What `reader` reads, with the faults in it; as Corruption.of() otherwise."""
+    """Return what `reader` reads, with the faults in it; as Corruption.of() otherwise."""
     source, factor, offset = (column.tolist() for column in vars(corruption).values())
     return lambda sample: factor[sample] * reader(source[sample]) + offset[sample]
 
 
 def _pace(period: float) -> Iterator[None]:
-    """Waits, each time it is advanced, until that many periods have gone by on the wall clock."""
+    """Wait, each time the generator is advanced, until that many periods have passed on the wall clock."""
     due = clock.perf_counter()
     while True:
         due += period

@@ -57,14 +57,14 @@ def simulate(
     story: Callable[[], Story] | None = None,
     snapshots: float | None = None,
 ) -> Result:
-    """Runs `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judges
-    it; with `out_dir` also writes bus.log, the signals in `formats` (formats.FORMATS), report.html (with the extra
-    `report`) and summary.json there, all or none. `channel` is the bus's name in bus.log; `inputs` are files that the
-    scenario is from; `story` makes a first picture for the report; in this process the firmware sends its state each
-    `snapshots` seconds.
+    """Run `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judge it;
+    with `out_dir` also write bus.log, the signals in `formats` (formats.FORMATS), report.html (with the extra `report`)
+    and summary.json there, all or none. `channel` is the bus's name in bus.log; `inputs` are files that the scenario is
+    from; `story` makes a first picture for the report; in this process the firmware sends its state each `snapshots`
+    seconds.
 
     `realtime` paces the samples by the wall clock, otherwise they come as fast as they are answered. The run and its
-    files but for the wall times are the same either way. Raises LeverError.
+    files but for the wall times are the same either way. Raise LeverError.
     """
     start = clock.perf_counter()
     if out_dir is not None:
@@ -90,7 +90,7 @@ def simulate(
 
 
 def _check_bounded(recording: Recording) -> None:
-    """Raises LeverError for a run that no arithmetic can judge."""
+    """Raise LeverError for a run that no arithmetic can judge."""
     inputs = recording.inputs
     signals = {"z_ddot": inputs.z_ddot, "theta": recording.theta, "theta_dot": recording.theta_dot}
     for name, signal in (signals | {"tau_m": recording.tau_m}).items():
@@ -113,7 +113,7 @@ class _Files:
     story: Callable[[], Story] | None
 
     def write(self, result: Result, published: NDArray[np.bool_], start: float) -> None:
-        """Writes the files; summary.json comes last, so that its wall time is of everything."""
+        """Write the files; summary.json comes last, so that its wall time is of everything."""
         from lever_cdkf.report import write_report
 
         def elapsed() -> SimulationSummary:

@@ -42,7 +42,7 @@ class Task:
 
 
 def run(tasks: Sequence[Task], jobs: int, progress: Progress | None = None) -> list[SimulationSummary]:
-    """The summaries of all runs in the order of `tasks`, from `jobs` processes. Raises LeverError."""
+    """Return the summaries of all runs in the order of `tasks`, from `jobs` processes. Raise LeverError."""
     return in_processes(simulate, tasks, jobs, progress)
 
 
@@ -59,7 +59,7 @@ def in_processes(
 
 
 def simulate(task: Task) -> SimulationSummary:
-    """The summary of one run. Raises LeverError."""
+    """Return the summary of one run. Raise LeverError."""
     from ..scenarios import scenario
     from . import runner
 
@@ -76,7 +76,8 @@ def rms(summaries: Sequence[SimulationSummary], key: str) -> FloatArray:
 
 
 def coverage(summaries: Sequence[SimulationSummary], key: str) -> FloatArray:
-    """Share of the time of each run at which +-2 sigma holds the truth [%]; 0 where there is nothing to judge."""
+    """Return share of the time of each run at which +-2 sigma holds the truth [%]; 0 where there is nothing to
+    judge."""
     values = [summary.parameters[key].coverage_2sigma for summary in summaries]
     return 100.0 * np.array([value or 0.0 for value in values])
 
@@ -88,17 +89,18 @@ def times_to_5_percent(summaries: Sequence[SimulationSummary], key: str) -> Floa
 
 
 def judged(summaries: Sequence[SimulationSummary]) -> list[str]:
-    """The quantities of which at least one run has an error to judge: none in runs that are too short."""
+    """Return the quantities of which at least one run has an error to judge: none in runs that are too short."""
     return [key for key in summaries[0].parameters if np.isfinite(rms(summaries, key)).any()]
 
 
 def flagged(summaries: Sequence[SimulationSummary]) -> FloatArray:
-    """Share of the judged time of each run with a fault that warns [%]."""
+    """Return share of the judged time of each run with a fault that warns [%]."""
     return 100.0 * np.array([summary.flagged_share or 0.0 for summary in summaries])
 
 
 def missed(summaries: Sequence[SimulationSummary]) -> list[str]:
-    """The limits that are not kept by the median of the rms errors, and by the coverage over all runs; in words."""
+    """Return the limits that are not kept by the median of the rms errors, and by the coverage over all runs; in
+    words."""
     keys = judged(summaries)
     return missed_limits(
         summaries[0].scenario.limits,
@@ -108,7 +110,7 @@ def missed(summaries: Sequence[SimulationSummary]) -> list[str]:
 
 
 def troubles(summaries: Sequence[SimulationSummary]) -> list[str]:
-    """What went wrong in runs, whatever their estimates, in words."""
+    """Return what went wrong in runs, whatever their estimates, in words."""
     reasons = []
     for what, wrong in (
         ("samples without an answer", [summary.unanswered > 0 for summary in summaries]),
@@ -121,7 +123,7 @@ def troubles(summaries: Sequence[SimulationSummary]) -> list[str]:
 
 
 def verdict(summaries: Sequence[SimulationSummary]) -> str:
-    """The runs in a few sentences."""
+    """Return the runs in a few sentences."""
     reasons = troubles(summaries) + missed(summaries)
     kept = kept_limits(*summaries) if summaries[0].scenario.limits else ""
     sentences = [f"Limits missed: {'; '.join(reasons)}." if reasons else kept]
@@ -142,7 +144,7 @@ def verdict(summaries: Sequence[SimulationSummary]) -> str:
 
 
 def tables(summaries: Sequence[SimulationSummary]) -> Tables:
-    """What is printed of the runs of one scenario."""
+    """Return what is printed of the runs of one scenario."""
     scenario = summaries[0].scenario
     numbers = [summary.scenario.seed for summary in summaries]
     title = f"{scenario.title} ({len(numbers)} seeds, {numbers[0]} to {numbers[-1]})"

@@ -37,7 +37,7 @@ MOST_TRANSFERS = 50
 
 
 def build(recording: Recording, trace: Trace) -> SimulationSummary:
-    """The content of summary.json, but for the wall times."""
+    """Return the content of summary.json, but for the wall times."""
     scenario = recording.scenario
     quality = {quantity.key: _quality(quantity, scenario, trace) for quantity in scenario.judged()}
     count = len(recording.inputs.time)
@@ -131,7 +131,7 @@ def _quality(quantity: Quantity, scenario: Scenario, trace: Trace) -> Quality:
 
 
 def judged_samples(scenario: Scenario, time: FloatArray) -> BoolArray:
-    """True from `converged_after` seconds after each change on, until the next one."""
+    """Return True from `converged_after` seconds after each change on, until the next one."""
     judged = np.ones(len(time), dtype=np.bool_)
     for change in scenario.changes():
         judged &= ~((time >= change) & (time < change + scenario.converged_after))
@@ -153,7 +153,7 @@ def times_to(relative: FloatArray, time: FloatArray, changes: tuple[float, ...],
 
 
 def _nis(scenario: Scenario, trace: Trace) -> Nis:
-    """Of the judged samples."""
+    """Return the nis of the judged samples."""
     outputs = freedom(trace["theta_measured_rad"], trace["theta_dot_measured_rad_s"])
     judged = judged_samples(scenario, trace["time_s"])
     innovations = Innovations()
@@ -162,7 +162,7 @@ def _nis(scenario: Scenario, trace: Trace) -> Nis:
 
 
 def _whiteness(scenario: Scenario, trace: Trace) -> Whiteness | None:
-    """Of the judged samples; None where there are too few."""
+    """Return the whiteness of the judged samples; None where there are too few."""
     residual = whiteness.residual(trace)
     if residual is None:
         return None
@@ -185,14 +185,15 @@ def _last(column: FloatArray) -> int:
 
 
 def _modes(trace: Trace) -> dict[str, float]:
-    """Seconds spent in each mode, by name, as far as HEALTH told."""
+    """Return seconds spent in each mode, by name, as far as HEALTH told."""
     mode, step = trace["mode"], float(trace["time_s"][1] - trace["time_s"][0])
     samples = {name: int(np.sum(mode == number)) for number, name in enum_names("lever_mode").items()}
     return {name: round(count * step, 9) for name, count in samples.items() if count}
 
 
 def _faults(scenario: Scenario, trace: Trace) -> tuple[dict[str, float], float | None]:
-    """Shares (0 to 1) of the judged time with each fault that there was, and any of DO_NOT_TRUST (None: unknown)."""
+    """Return shares (0 to 1) of the judged time with each fault that there was, and any of DO_NOT_TRUST (None:
+    unknown)."""
     column = trace["faults"][judged_samples(scenario, trace["time_s"])]
     counts = FaultCounts()
     counts.add(column)
@@ -202,7 +203,7 @@ def _faults(scenario: Scenario, trace: Trace) -> tuple[dict[str, float], float |
 def missed_limits(
     limits: Mapping[str, float] | None, rms_percent: Mapping[str, float | None], coverage: Mapping[str, float | None]
 ) -> list[str]:
-    """The limits of a scenario that were not kept, in words; None is not judged."""
+    """Return the limits of a scenario that were not kept, in words; None is not judged."""
     missed = []
     limits = limits or {}
     for name, rms in rms_percent.items():
@@ -228,7 +229,7 @@ def _whole_percent(share: float) -> int:
 
 
 def _verdict(summary: SimulationSummary) -> str:
-    """The run in a few sentences, for a reader who does not know Kalman filters."""
+    """Return the run in a few sentences, for a reader who does not know Kalman filters."""
     return " ".join(
         sentence
         for sentence in (
@@ -258,7 +259,7 @@ def _verdict_run(summary: SimulationSummary) -> str:
 
 
 def _verdict_settings(summary: SimulationSummary) -> str:
-    """A run on other settings is refused; one of less than a second may not learn which they are."""
+    """Refuse a run on other settings; one of less than a second may not learn which they are."""
     if summary.firmware.settings_as_scenario is not None:
         return ""
     return "The estimator has not sent its settings (IDENTITY): those of the scenario are assumed."
@@ -281,7 +282,7 @@ def _verdict_truth(summary: SimulationSummary) -> str:
 
 
 def kept_limits(*summaries: SimulationSummary) -> str:
-    """That the limits of the scenario are kept. They are the estimate's alone where the loop was unstable."""
+    """Return that the limits of the scenario are kept. They are the estimate's alone where the loop was unstable."""
     unstable = any(each.stability is not None and each.stability.unstable_s for each in summaries)
     return "The estimate keeps its limits, in a loop that was unstable." if unstable else "All limits kept."
 
@@ -312,5 +313,5 @@ def _verdict_sigma(quality: dict[str, Quality]) -> str:
 
 
 def _spelled(name: str) -> str:
-    """A quantity as it stands in a sentence; symbols stay."""
+    """Return a quantity as it stands in a sentence; symbols stay."""
     return {quantity.key: quantity.name for quantity in DYNAMICS}.get(name, name)

@@ -59,7 +59,7 @@ class Readings:
 
 
 def prepare(scenario: Scenario) -> Inputs:
-    """The parts of a run that do not depend on the estimator."""
+    """Return the parts of a run that do not depend on the estimator."""
     time, period = scenario.time(), scenario.period
     base = excitation.total(scenario.base, time, scenario.streams("base", scenario.base))
     dropouts = scenario.sensors.dropout
@@ -82,7 +82,7 @@ def prepare(scenario: Scenario) -> Inputs:
 
 
 def conditions(scenario: Scenario, inputs: Inputs) -> Conditions:
-    """What acts on the lever."""
+    """Return what acts on the lever."""
     return Conditions(
         inputs.z_ddot,
         scenario.period,
@@ -95,7 +95,8 @@ def conditions(scenario: Scenario, inputs: Inputs) -> Conditions:
 
 
 def flight(scenario: Scenario, inputs: Inputs) -> Flight | None:
-    """The helicopter around the lever, where there is one; the first acceleration of the cabin is in `inputs` then."""
+    """Return the helicopter around the lever, where there is one; the first acceleration of the cabin is in `inputs`
+    then."""
     if scenario.aircraft is None:
         return None
     hovering = Flight(scenario.aircraft, scenario.period, inputs.z_ddot.copy())
@@ -105,7 +106,7 @@ def flight(scenario: Scenario, inputs: Inputs) -> Flight | None:
 
 
 def readings(scenario: Scenario, inputs: Inputs, name: str) -> Readings:
-    """Of the sensor of one of sensors.VALUES, which there must be."""
+    """Return the readings of the sensor of one of sensors.VALUES, which there must be."""
     sensor: sensors.Sensor = getattr(scenario.sensors, name)
     corruption, missing = None, inputs.missing[name]
     if sensor.fault or missing.any():
@@ -115,8 +116,8 @@ def readings(scenario: Scenario, inputs: Inputs, name: str) -> Readings:
 
 
 def commands(scenario: Scenario, time: FloatArray) -> dict[int, Mapping[str, Value]]:
-    """What to send at the samples before which a COMMAND goes out: a reset with the scenario's choices at the start,
-    the dither as it changes, and while it or a mitigation is on, one that keeps them alive."""
+    """Return what to send at the samples before which a COMMAND goes out: a reset with the scenario's choices at the
+    start, the dither as it changes, and while it or a mitigation is on, one that keeps them alive."""
     changes = {int(np.searchsorted(time, when - 1e-9)): rms for when, rms in scenario.dithers()}
     sent: dict[int, Mapping[str, Value]] = {0: {"request": "reset", "dither_rms": 0.0, **scenario.config.choices}}
     repetition = max(1, round(KEEP_ALIVE / scenario.period))

@@ -14,6 +14,6 @@ _NUMBERED = (
 
 
 def stream(seed: int, purpose: str, index: int = 0) -> np.random.Generator:
-    """The random numbers of a seed for one purpose, by its name, and item."""
+    """Return the random numbers of a seed for one purpose, by its name, and item."""
     number = _NUMBERED.index(purpose) if purpose in _NUMBERED else zlib.crc32(purpose.encode())
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(number, index))))

@@ -165,7 +165,7 @@ class Scenario:
 
     @cached_property
     def config(self) -> Config:
-        """The estimator's configuration. Raises ScenarioError."""
+        """The estimator's configuration. Raise ScenarioError."""
         try:
             return Config(**dataclasses.asdict(self.estimator), settings=self.settings)
         except SettingsError as error:
@@ -186,36 +186,37 @@ class Scenario:
         return lever_plant.Lever.from_settings(self.config.settings | dict(self.lever or {}))
 
     def time(self) -> FloatArray:
-        """Times of the samples [s], from 0."""
+        """Return times of the samples [s], from 0."""
         return np.arange(max(2, round(self.duration / self.period)), dtype=np.float64) * self.period
 
     def stream(self, purpose: str, index: int = 0) -> np.random.Generator:
-        """The random numbers for one purpose and item; no other draw shifts them."""
+        """Return the random numbers for one purpose and item; no other draw shifts them."""
         return random_streams.stream(self.seed, purpose, index)
 
     def streams(self, purpose: str, items: Iterable[object]) -> list[np.random.Generator]:
-        """One stream for each of `items`."""
+        """Return one stream for each of `items`."""
         return [self.stream(purpose, index) for index, _ in enumerate(items)]
 
     def corruption(self, what: str, time: FloatArray) -> Corruption:
-        """What the faults of the sensor of `what` (one of sensors.VALUES) do at the times `time` [s]."""
+        """Return what the faults of the sensor of `what` (one of sensors.VALUES) do at the times `time` [s]."""
         sensor: Sensor = getattr(self.sensors, what)
         return sensor.corruption(time, self.stream("fault", VALUES.index(what)))
 
     def truth(self, time: FloatArray) -> Truth:
-        """The pilot on his lever at the times `time` [s]. Raises ScenarioError when he cannot be."""
+        """Return the pilot on his lever at the times `time` [s]. Raise ScenarioError when he cannot be."""
         try:
             return self.pilot.truth(time, self.stream, self.true_lever)
         except ValueError as error:
             raise ScenarioError(f"{self.file}: pilot.{error}") from None
 
     def judged(self) -> tuple[quantities.Quantity, ...]:
-        """What there is a truth of: everything, or no parameters when the pilot is not of the estimator's model."""
+        """Return what there is a truth of: everything, or no parameters when the pilot is not of the estimator's
+        model."""
         model = self.config.choices["model"]
         return quantities.quantities(model) if self.pilot.model == model else quantities.DYNAMICS
 
     def check(self) -> None:
-        """Raises ScenarioError for what only shows when the parts are put together."""
+        """Raise ScenarioError for what only shows when the parts are put together."""
         truth = self.truth(self.time())
         if self.aircraft is not None and self.aircraft.aircraft.delay < self.period:
             raise ScenarioError(
@@ -234,7 +235,8 @@ class Scenario:
                 raise ScenarioError(f"{self.file}: limits.{name}: this run has no true value of it")
 
     def changes(self) -> tuple[float, ...]:
-        """Times [s] after which the parameters have to be found anew: the start, and every jump of one of them."""
+        """Return times [s] after which the parameters have to be found anew: the start, and every jump of one of
+        them."""
         return (0.0, *sorted(time for time in self.pilot.changes() if 0.0 < time < self.duration))
 
     def dithers(self) -> list[tuple[float, float]]:
@@ -252,7 +254,8 @@ names = SHELF.names
 
 
 def load(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scenario:
-    """The scenario of that name, or in the file of that path (ending in .toml), with "key.subkey=value" overrides.
+    """Return the scenario of that name, or in the file of that path (ending in .toml), with "key.subkey=value"
+    overrides.
 
     Raises ScenarioError.
     """
@@ -306,7 +309,7 @@ def _override(values: dict[str, Any], override: str) -> None:
 
 
 def _entries(target: Any, path: str) -> str:
-    """How to name an entry of a list, or a further one."""
+    """Return how to name an entry of a list, or a further one."""
     if not isinstance(target, list):
         return ""
     count = len(target)

@@ -50,7 +50,7 @@ def draw(seed: int, number: int) -> tuple[Scenario, list[str]]:
 
 
 def _without_empty(values: Values) -> Values:
-    """A table may leave a list out, but has none without items."""
+    """Return a list that a table may leave out, but that is not empty where it is there."""
     return {
         name: _without_empty(value) if isinstance(value, dict) else value
         for name, value in values.items()
@@ -108,7 +108,7 @@ Fault = Callable[[Values, np.random.Generator, float], None]
 
 
 def _wrong(sensor: str, kind: Values, least: float, most: float) -> Fault:
-    """A reading that counts as valid, for so long [s]."""
+    """Return a reading that counts as valid, for so long [s]."""
 
     def add(sensors: Values, rng: np.random.Generator, start: float) -> None:
         end = start + rng.uniform(least, most)

@@ -85,7 +85,7 @@ class Sums:
 
 
 def memory() -> float:
-    """Of this process, now [MiB]; where the system does not say, the most that it ever was."""
+    """Return the memory of this process, now [MiB]; where the system does not say, the most that it ever was."""
     status = Path("/proc/self/statm")
     if status.exists():
         return int(status.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
@@ -122,7 +122,7 @@ class Result:
         return self.parts[-1].memory - self.settled_memory
 
     def troubles(self) -> list[str]:
-        """What must not be."""
+        """Return what must not be."""
         total = self.total
         found = []
         if total.not_finite:
@@ -135,7 +135,7 @@ class Result:
 
 
 def run(hours: float, seed: int, show: Show) -> Result:
-    """Flies for so many hours, in flights of DURATION."""
+    """Fly for so many hours, in flights of DURATION."""
     estimator = Estimator(Config())
     count = max(1, round(hours * HOUR / DURATION))
     of_an_hour = round(HOUR / DURATION)
@@ -155,7 +155,7 @@ def run(hours: float, seed: int, show: Show) -> Result:
 
 
 def _fly(scenario: Scenario, estimator: Estimator, number: int) -> Sums:
-    """One flight; the instance goes on from the one before."""
+    """Return one flight; the instance goes on from the one before."""
     inputs = scenario_inputs.prepare(scenario)
     every = round(STRIDE / scenario.period)
     before = estimator.health()
@@ -221,6 +221,6 @@ def _nees(values: dict[str, FloatArray], estimates: NDArray[Any]) -> FloatArray:
 
 
 def _stretches(wrong: BoolArray) -> int:
-    """Looks in stretches that last longer than WRONG."""
+    """Look in stretches that last longer than WRONG."""
     lengths = (last - first + 1 for first, last in runs(wrong))
     return sum(length for length in lengths if length * STRIDE > WRONG)

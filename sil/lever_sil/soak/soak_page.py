@@ -23,7 +23,7 @@ others too small.</p>
 
 
 def build(result: Result, rows: list[Row], verdict: str) -> str:
-    """The whole page; `rows` are the hours, as printed."""
+    """Return the whole page; `rows` are the hours, as printed."""
     page = Page("A day without a reset", "One instance of the firmware, hour by hour.", "lever soak")
     page.section("hours", "Hours", "Consistency by the hour", page.figure("chart", _chart(result), ""), _SEES)
     shown = [[html.escape(_text(cell)) for cell in row.values()] for row in rows]

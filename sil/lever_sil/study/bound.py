@@ -41,7 +41,7 @@ from .transitions import (
 
 
 def posterior_cramer_rao(batch: Batch, at: NDArray[np.int64]) -> Array:
-    """(T, 5, 5) bound of the covariance of errors of [w; theta, theta_dot] after the samples `at`, which rise.
+    """Return (T, 5, 5) bound of the covariance of errors of [w; theta, theta_dot] after the samples `at`, which rise.
 
     Raises ValueError where the truth is no member of the model, or where the states have no process noise.
     """
@@ -70,7 +70,7 @@ def _moments(block: Array, weight: Array) -> tuple[Array, Array]:
 
 
 def variances(batch: Batch, at: NDArray[np.int64], covariance: Array) -> Array:
-    """(T, 5) of w, natural frequency and damping ratio, the latter two relative, of posterior_cramer_rao().
+    """Return (T, 5) of w, natural frequency and damping ratio, the latter two relative, of posterior_cramer_rao().
 
     The bound of a function is that of z through the mean of its gradient over trajectories.
     """

@@ -77,7 +77,7 @@ class Candidate(Protocol):
 def candidate(name: str) -> Estimator:
     """Return the class MODULE:CLASS as an estimator; modules are looked for in the current folder, too.
 
-    Raises LeverError if there is no such class, or one of its methods is missing.
+    Raise LeverError if there is no such class, or one of its methods is missing.
     """
     module, _, attribute = name.partition(":")
     if not (module and attribute):
@@ -95,7 +95,7 @@ def candidate(name: str) -> Estimator:
 
 
 def _run(make: Callable[[], Candidate], batch: Batch, at: NDArray[np.int64]) -> Estimates:
-    """One run after the other. A numpy.linalg.LinAlgError ends a run: it has broken down."""
+    """Return one run after the other. A numpy.linalg.LinAlgError ends a run: it has broken down."""
     p = np.full((batch.runs, len(at), PARAMETERS), np.nan)
     covariance = np.full((*p.shape, PARAMETERS), np.nan)
     config, wanted, states_any = Config(batch.model, batch.period, batch.knowledge), set(at.tolist()), False

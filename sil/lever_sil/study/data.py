@@ -28,10 +28,11 @@ class Model(Protocol):
         """ "fixed" or "trim"."""
 
     def step(self, x: Array, p: Array, u: tuple[float | Array, float | Array], trim: float | Array, dt: float) -> Array:
-        """States (2, …) dt [s] later, of parameters (3, …) in physical units."""
+        """Return states (2, …) dt [s] later, of parameters (3, …) in physical units."""
 
     def dynamics(self, p: Array, trim: float | Array) -> Array:
-        """Natural frequency [Hz] and damping ratio [1], (2, …), of parameters (3, …) about the angle `trim` [rad]."""
+        """Return natural frequency [Hz] and damping ratio [1], (2, …), of parameters (3, …) about the angle `trim`
+        [rad]."""
 
 
 @dataclass(frozen=True)
@@ -72,13 +73,13 @@ class Knowledge:
         return self.walk if self.positive else self.walk / self.sigma
 
     def process_covariance(self, dt: float) -> Array:
-        """(2, 2) of the state over dt [s]: an integrated random walk of theta_dot (van Loan 1978)."""
+        """Return (2, 2) of the state over dt [s]: an integrated random walk of theta_dot (van Loan 1978)."""
         q = self.process_noise**2
         return q * np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
 
 
 def rest_angle(model: Model, p: Array, trim: Array, period: float) -> Array:
-    """Angle (…) [rad] at which parameters p (3, …) rest; NaN where they do not hold the lever.
+    """Return angle (…) [rad] at which parameters p (3, …) rest; NaN where they do not hold the lever.
 
     With preload trim that is the trim; with preload fixed it is where a step from rest changes no rate (Newton's
     method, with differences for slopes).
@@ -148,7 +149,7 @@ class Batch:
         return int(self.y.shape[1])
 
     def rest(self, at: NDArray[np.int64]) -> Array:
-        """(B, T) angle [rad] at which the lever rests at the samples `at`, about which its dynamics are told.
+        """Return (B, T) angle [rad] at which the lever rests at the samples `at`, about which its dynamics are told.
 
         With preload fixed that depends on the parameters: raises ValueError if there are none to be known.
         """
@@ -159,7 +160,7 @@ class Batch:
         return rest_angle(self.model, np.moveaxis(self.truth.p[:, at], -1, 0), self.trim[:, at], self.period)
 
     def move(self, k: int, x: Array, w: Array) -> Array:
-        """States at sample k + 1 of states x (B, …, 2) at sample k with scaled parameters w (B, …, 3).
+        """Return states at sample k + 1 of states x (B, …, 2) at sample k with scaled parameters w (B, …, 3).
 
         The dimensions between are free (sigma points) and broadcast; inputs are the mean of both ends.
         """

@@ -18,7 +18,8 @@ from .data import OUTPUTS, Batch
 
 
 def detrended(batch: Batch, corner: float, align_time: float) -> Batch:
-    """The batch with y, u and trim made of raw_y and raw_u; corner [Hz], theta at first a mean of align_time [s]."""
+    """Return the batch with y, u and trim made of raw_y and raw_u; corner [Hz], theta at first a mean of align_time
+    [s]."""
     signals = np.concatenate((batch.raw_y, batch.raw_u), axis=2)
     start = np.zeros((batch.runs, signals.shape[2]))
     start[:, 0] = batch.raw_y[:, : max(1, round(align_time / batch.period)), 0].mean(axis=1)
@@ -27,7 +28,7 @@ def detrended(batch: Batch, corner: float, align_time: float) -> Batch:
 
 
 def deviations(signals: Array, start: Array, corner: float, dt: float) -> tuple[Array, Array]:
-    """Deviations of signals (B, K, n) from the levels before each sample, and those levels, both (B, K, n).
+    """Return deviations of signals (B, K, n) from the levels before each sample, and those levels, both (B, K, n).
 
     The levels start at `start` (B, n), at rest; corner [Hz], dt [s].
     """

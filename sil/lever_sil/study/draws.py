@@ -12,20 +12,21 @@ STREAMS = ("base", "dither", "pilot", "process", "output")
 
 
 def stream(seed: int, purpose: str, run: int) -> np.random.Generator:
-    """The random numbers for one purpose of STREAMS in one run; no other draw shifts them."""
+    """Return the random numbers for one purpose of STREAMS in one run; no other draw shifts them."""
     key = (STREAMS.index(purpose), run)
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key)))
 
 
 def streams(seed: int, runs: int) -> list[dict[str, np.random.Generator]]:
-    """All of each run, by purpose."""
+    """Return all of each run, by purpose."""
     return [{purpose: stream(seed, purpose, run) for purpose in STREAMS} for run in range(runs)]
 
 
 def excitation(
     rms: tuple[float, float], band: tuple[float, float], time: Array, own: dict[str, np.random.Generator]
 ) -> Array:
-    """(K, 2) z_ddot [m/s²] and tau_m [N m] of one run at the times (K,) [s]: noise of `rms` in the `band` [Hz]."""
+    """Return (K, 2) z_ddot [m/s²] and tau_m [N m] of one run at the times (K,) [s]: noise of `rms` in the `band`
+    [Hz]."""
     low, high = band
     sources = zip(rms, (own["base"], own["dither"]), strict=True)
     return np.stack([Noise(rms=part, low=low, high=high).samples(time, rng) for part, rng in sources], axis=-1)

@@ -55,7 +55,7 @@ _COLUMNS = ("parameter", "parameter_sigma", "parameter_correlation", "nis", "rec
 
 
 def covariance_of(sigma: Array, correlation: Array) -> Array:
-    """(B, T, 3, 3) of standard deviations (B, T, 3) and correlations of _PAIRS (B, T, 3)."""
+    """Return (B, T, 3, 3) of standard deviations (B, T, 3) and correlations of _PAIRS (B, T, 3)."""
     matrix = np.zeros((*sigma.shape, PARAMETERS))
     matrix[..., range(PARAMETERS), range(PARAMETERS)] = 1.0
     for index, (i, j) in enumerate(_PAIRS):

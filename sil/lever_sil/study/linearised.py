@@ -35,9 +35,9 @@ from .transitions import (
 
 
 def covariances(batch: Batch, at: NDArray[np.int64]) -> Array:
-    """(B, T, 5, 5) of [w; theta, theta_dot] after the samples `at`, which rise.
+    """Return (B, T, 5, 5) of [w; theta, theta_dot] after the samples `at`, which rise.
 
-    Raises ValueError where the truth is no member of the model.
+    Raise ValueError where the truth is no member of the model.
     """
     process, noise = process_covariance(batch), np.diag(batch.knowledge.output_noise**2)
     p = np.tile(initial_covariance(batch), (batch.runs, 1, 1))
@@ -50,7 +50,7 @@ def covariances(batch: Batch, at: NDArray[np.int64]) -> Array:
 
 
 def variances(batch: Batch, at: NDArray[np.int64], covariance: Array) -> Array:
-    """(B, T, 5) of w and of natural frequency and damping ratio relative to the truth, of covariances().
+    """Return (B, T, 5) of w and of natural frequency and damping ratio relative to the truth, of covariances().
 
     The latter two by the delta method. The squares of `scores.errors` are held against these.
     """

@@ -69,7 +69,7 @@ class Condition:
     """By name, where they differ from the firmware's defaults: noises, walks, first guesses, the lever …"""
 
     def all_settings(self) -> dict[str, float]:
-        """Every setting. Raises SettingsError for one that the firmware would not take."""
+        """Return every setting. Raises SettingsError for one that the firmware would not take."""
         for name, value in self.settings.items():
             setting(name).check(value)
         settings = {row.name: row.default for row in settings_table()} | dict(self.settings)
@@ -79,7 +79,7 @@ class Condition:
 
 
 def knowledge(settings: Mapping[str, float], kind: Kind) -> Knowledge:
-    """What a filter with these settings is given."""
+    """Return what a filter with these settings is given."""
     return Knowledge(
         guess=np.array([settings[name] for name in kind.parameters]),
         sigma=np.array([settings[f"{name}_sigma"] for name in kind.parameters]),
@@ -91,9 +91,10 @@ def knowledge(settings: Mapping[str, float], kind: Kind) -> Knowledge:
 
 
 def matched(condition: Condition, runs: int, duration: float, seed: int) -> Batch:
-    """`runs` runs of `duration` [s]. The same seed gives the same batch, to the bit, and run i whatever `runs` is.
+    """Return `runs` runs of `duration` [s]. The same seed gives the same batch, to the bit, and run i whatever `runs`
+    is.
 
-    Raises ValueError for a model or preload that does not exist, and for settings by which hardly any draw of the
+    Raise ValueError for a model or preload that does not exist, and for settings by which hardly any draw of the
     parameters stays in the bounds.
     """
     if condition.model not in KINDS:
@@ -118,7 +119,7 @@ def matched(condition: Condition, runs: int, duration: float, seed: int) -> Batc
 
 
 def tightened(batch: Batch, factors: Array) -> Batch:
-    """The same runs, with the parameters times `factors` (K, 3): same inputs, same noises."""
+    """Return the same runs, with the parameters times `factors` (K, 3): same inputs, same noises."""
     truth = batch.truth
     assert truth.p is not None
     p = truth.p * factors
@@ -140,21 +141,22 @@ def tightened(batch: Batch, factors: Array) -> Batch:
 
 
 def jump(samples: int, moment: int, factors: Array) -> Array:
-    """(K, 3) factors for `tightened`: from sample `moment` on those given (3,)."""
+    """Return (K, 3) factors for `tightened`: from sample `moment` on those given (3,)."""
     held = np.ones((samples, PARAMETERS))
     held[moment:] = factors
     return held
 
 
 def _bounds(kind: Kind) -> Array:
-    """(3, 2) least and greatest parameters of the model, which are those that settings take for the first guess."""
+    """Return (3, 2) least and greatest parameters of the model, which are those that settings take for the first
+    guess."""
     return np.array([(setting(name).least, setting(name).greatest) for name in kind.parameters])
 
 
 def _parameters(
     model: Model, assumed: Knowledge, bounds: Array, trim: Array, period: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """(K, 3) physical parameters of one run, within the bounds (3, 2), and (K, 2) their dynamics; trim (K,)."""
+    """Return (K, 3) physical parameters of one run, within the bounds (3, 2), and (K, 2) their dynamics; trim (K,)."""
     scale = np.vstack((assumed.sigma_w, np.tile(math.sqrt(period) * assumed.walk_w, (len(trim) - 1, 1))))
     for _ in range(_MOST_DRAWS):
         p = assumed.physical(np.cumsum(scale * rng.standard_normal(scale.shape), axis=0))
@@ -166,14 +168,14 @@ def _parameters(
 
 
 def _kicks(assumed: Knowledge, steps: int, period: float, rng: np.random.Generator) -> Array:
-    """(K - 1, 2) process noise of one run: with the covariance of Knowledge.process_covariance."""
+    """Return (K - 1, 2) process noise of one run: with the covariance of Knowledge.process_covariance."""
     white = assumed.process_noise * math.sqrt(period) * rng.standard_normal((steps, STATES))
     rate = white[:, 0]
     return np.stack((period * (rate / 2.0 + white[:, 1] / math.sqrt(12.0)), rate), axis=-1)
 
 
 def _states(model: Model, p: Array, u: Array, trim: Array, kicks: Array, period: float) -> Array:
-    """(B, K, 2) from rest; parameters (B, K, 3), inputs (B, K, 2), trim (B, K), process noise (B, K - 1, 2)."""
+    """Return (B, K, 2) from rest; parameters (B, K, 3), inputs (B, K, 2), trim (B, K), process noise (B, K - 1, 2)."""
     mean = 0.5 * (u[:, 1:] + u[:, :-1])
     p, mean, kicks = (np.ascontiguousarray(part.transpose(1, 2, 0)) for part in (p, mean, kicks))
     trim = np.ascontiguousarray(trim.T)

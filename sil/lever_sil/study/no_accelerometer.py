@@ -62,7 +62,7 @@ def _white(frequency: Array, _: Array) -> Array:
 
 
 def shaped(frequency: Array, free: Array) -> Array:
-    """A band-pass of second order: logarithms of its centre [Hz] and of its damping ratio."""
+    """Return a band-pass of second order: logarithms of its centre [Hz] and of its damping ratio."""
     ratio, damping = frequency / np.exp(free[0]), np.exp(free[1])
     band: Array = (2.0 * damping * ratio) ** 2 / ((1.0 - ratio**2) ** 2 + (2.0 * damping * ratio) ** 2)
     return band
@@ -113,7 +113,8 @@ def likeliest(y: Array, truth: Array, spectrum: Spectrum, start: tuple[float, ..
 
 
 def _periodogram(y: Array, noise: Array, period: float) -> tuple[Array, Array, Array]:
-    """Frequencies [Hz]; the periodogram of theta from both outputs, weighted by their noise; its noise (one-sided)."""
+    """Return frequencies [Hz]; the periodogram of theta from both outputs, weighted by their noise; its noise
+    (one-sided)."""
     frequency = np.fft.rfftfreq(len(y), period)
     inside = (frequency >= _BAND[0]) & (frequency <= _BAND[1])
     taper = np.hanning(len(y))  # what is loud at one frequency does not leak into others

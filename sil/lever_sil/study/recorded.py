@@ -27,14 +27,14 @@ _STATES = ("theta_true_rad", "theta_dot_true_rad_s")
 
 
 def usable(scenario: Scenario) -> bool:
-    """Whether every sample is complete, as the estimators of a study need it."""
+    """Return whether every sample is complete, as the estimators of a study need it."""
     return not scenario.sensors.dropout
 
 
 def recorded(name: str, runs: int, seed: int, duration: float | None = None) -> Batch:
-    """`runs` runs of a shipped scenario with the seeds from `seed` on, for its `duration` [s] or its own.
+    """Return `runs` runs of a shipped scenario with the seeds from `seed` on, for its `duration` [s] or its own.
 
-    Raises ScenarioError for one that is not there or has dropouts.
+    Raise ScenarioError for one that is not there or has dropouts.
     """
     length = [] if duration is None else [f"duration={duration:g} s"]
     scenarios = [load(name, [*length, f"seed={seed + run}"]) for run in range(runs)]
@@ -60,5 +60,5 @@ def _run(scenario: Scenario) -> Trace:
 
 
 def _columns(traces: list[Trace], names: Sequence[str]) -> Array:
-    """(B, K, n)"""
+    """Return (B, K, n)."""
     return np.stack([np.stack([columns[name] for name in names], axis=-1) for columns in traces])

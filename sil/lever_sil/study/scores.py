@@ -20,7 +20,7 @@ from .data import Batch, Estimates
 
 
 def errors(batch: Batch, estimates: Estimates) -> Array:
-    """(B, T, 5) errors of w, and those of natural frequency and damping ratio relative to the truth.
+    """Return (B, T, 5) errors of w, and those of natural frequency and damping ratio relative to the truth.
 
     Those of w are NaN where the truth is no member of the model.
     """
@@ -34,7 +34,7 @@ def errors(batch: Batch, estimates: Estimates) -> Array:
 
 
 def rms(deviations: Array) -> Array:
-    """(n,) over runs and times of errors (B, T, n)."""
+    """Return (n,) over runs and times of errors (B, T, n)."""
     mean: Array = np.sqrt(np.mean(np.square(deviations), axis=(0, 1)))
     return mean
 
@@ -43,7 +43,8 @@ def rms(deviations: Array) -> Array:
 
 
 def ratio(deviations: Array, variances: Array) -> Array:
-    """(n,) rms of errors (B, T, n) ÷ root of the mean of variances (B, T, n) or (T, n) (linearised.py, bound.py).
+    """Return (n,) rms of errors (B, T, n) ÷ root of the mean of variances (B, T, n) or (T, n) (linearised.py,
+    bound.py).
 
     With the squares of another estimator's errors for `variances`: how the two compare. On the same data that ratio has
     the smaller spread, as most of what chance does, it does to both.
@@ -53,7 +54,7 @@ def ratio(deviations: Array, variances: Array) -> Array:
 
 
 def ratio_spread(deviations: Array, variances: Array, seed: int, draws: int = 2000) -> Array:
-    """(n,) standard error of `ratio`, by drawing runs with replacement (B. Efron, Annals of Statistics 7, 1979).
+    """Return (n,) standard error of `ratio`, by drawing runs with replacement (B. Efron, Annals of Statistics 7, 1979).
 
     Times of one run depend on each other, so it is runs that are drawn. NaN for a single run.
     """
@@ -78,12 +79,14 @@ def ratio_spread(deviations: Array, variances: Array, seed: int, draws: int = 20
 
 
 def sigma_ratio(deviations: Array, variances: Array) -> Array:
-    """(n,) what an estimator claims ÷ what it does: root of the mean of its variances (B, T, n) ÷ rms of its errors."""
+    """Return (n,) what an estimator claims ÷ what it does: root of the mean of its variances (B, T, n) ÷ rms of its
+    errors."""
     return 1.0 / ratio(deviations, variances)
 
 
 def normalised_squares(deviations: Array, covariance: Array) -> Array:
-    """(B, T) eᵀ P⁻¹ e of errors (B, T, n) with stated covariances (B, T, n, n): NEES; infinite for a singular one."""
+    """Return (B, T) eᵀ P⁻¹ e of errors (B, T, n) with stated covariances (B, T, n, n): NEES; infinite for a singular
+    one."""
     regular = np.linalg.slogdet(covariance).sign != 0.0
     invertible = np.where(regular[..., None, None], covariance, np.eye(covariance.shape[-1]))
     squares: Array = np.einsum("bti,bti->bt", deviations, np.linalg.solve(invertible, deviations[..., None])[..., 0])
@@ -111,7 +114,7 @@ class Consistency:
 
 
 def consistency(squares: Array, freedom: int) -> Consistency:
-    """Of NEES or NIS (B, T), each expected to be chi-square with `freedom` degrees of freedom.
+    """Return the consistency of NEES or NIS (B, T), each expected to be chi-square with `freedom` degrees of freedom.
 
     The mean over B runs at one time lies in the band of chi-square with B `freedom` degrees of freedom, ÷ B. That is
     taken for the band of the mean over all times as well: right where a run's squares hardly change in time, and wider
@@ -127,7 +130,7 @@ def consistency(squares: Array, freedom: int) -> Consistency:
 
 
 def settling_times(relative: Array, elapsed: Array, within: float = 0.05) -> Array:
-    """(B,) time [s] from which on each run's |error| (B, T) stays <= `within` to the end; NaN if it never does.
+    """Return (B,) time [s] from which on each run's |error| (B, T) stays <= `within` to the end; NaN if it never does.
 
     `elapsed` (T,) [s] counts from the change that is to be followed; what lies before it does not matter. A time
     without an estimate (NaN) counts as outside.
@@ -141,7 +144,7 @@ def settling_times(relative: Array, elapsed: Array, within: float = 0.05) -> Arr
 
 
 def median_and_worst(times: Array) -> tuple[float, float]:
-    """Of settling times (B,) with NaN for never: each is NaN when it is never."""
+    """Return the median and worst of settling times (B,) with NaN for never: each is NaN when it is never."""
     settled = np.where(np.isnan(times), np.inf, times)
     middle, worst = float(np.median(settled)), float(settled.max())
     return (middle if math.isfinite(middle) else math.nan), (worst if math.isfinite(worst) else math.nan)

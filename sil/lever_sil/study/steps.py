@@ -51,7 +51,7 @@ class Step:
 
 
 def stepped(step: Step, runs: int, seed: int) -> Batch:
-    """`runs` runs, detrended; run i is the same, to the bit, whatever `runs` is."""
+    """Return `runs` runs, detrended; run i is the same, to the bit, whatever `runs` is."""
     settings = {row.name: row.default for row in settings_table()} | {"theta_dot_process_noise": step.process_noise}
     kind, lever, period = KINDS[step.model], Lever.from_settings(settings, "trim"), settings["sample_period"]
     assumed = knowledge(settings, kind)
@@ -77,7 +77,7 @@ def stepped(step: Step, runs: int, seed: int) -> Batch:
 
 
 def follow(lever: Lever, p: Array, u: Array, trim: float, kicks: Array, period: float) -> Array:
-    """(B, K, 2) states from rest; parameters (B, K, 3) held and inputs (B, K, 2) interpolated between samples.
+    """Return (B, K, 2) states from rest; parameters (B, K, 3) held and inputs (B, K, 2) interpolated between samples.
 
     kicks (B, K - 1, substeps): what noise adds to theta_dot [rad/s] (Euler–Maruyama; the drift by Lever.step).
     """

@@ -20,7 +20,7 @@ _BLOCK = 500  # samples linearised at a time, so that the arrays stay in the cac
 
 
 def true_parameters(batch: Batch) -> Array:
-    """(B, K, 3) in physical units. Raises ValueError where the truth is no member of the model."""
+    """Return (B, K, 3) in physical units. Raise ValueError where the truth is no member of the model."""
     if batch.truth.p is None:
         raise ValueError("nothing to linearise: the truth is no member of the model")
     return batch.truth.p
@@ -35,7 +35,7 @@ def transitions(batch: Batch, last: int) -> Iterator[Array]:
 
 
 def _block(batch: Batch, z: Array, begin: int, end: int) -> Array:
-    """(n, B, 5, 5) F of the steps from the samples begin to end - 1, by central differences."""
+    """Return (n, B, 5, 5) F of the steps from the samples begin to end - 1, by central differences."""
     mean = 0.5 * (batch.u[:, begin:end] + batch.u[:, begin + 1 : end + 1])
     u, trim, start = (mean[..., 0], mean[..., 1]), batch.trim[:, begin:end], z[:, :, begin:end]
 
@@ -54,12 +54,12 @@ def _block(batch: Batch, z: Array, begin: int, end: int) -> Array:
 
 
 def initial_covariance(batch: Batch) -> Array:
-    """(5, 5) P at the first sample: w as uncertain as it is guessed, the state as it is measured."""
+    """Return (5, 5) P at the first sample: w as uncertain as it is guessed, the state as it is measured."""
     return np.diag((*batch.knowledge.sigma_w**2, *batch.knowledge.output_noise**2))
 
 
 def process_covariance(batch: Batch) -> Array:
-    """(5, 5) Q of one step."""
+    """Return (5, 5) Q of one step."""
     covariance = np.zeros((SIZE, SIZE))
     covariance[:PARAMETERS, :PARAMETERS] = np.diag(batch.knowledge.walk_w**2 * batch.period)
     covariance[PARAMETERS:, PARAMETERS:] = batch.knowledge.process_covariance(batch.period)
@@ -67,7 +67,8 @@ def process_covariance(batch: Batch) -> Array:
 
 
 def measured(p: Array, noise: Array) -> Array:
-    """Covariances (B, 5, 5) after a sample of both states with the covariance `noise` (2, 2), of those before it."""
+    """Return covariances (B, 5, 5) after a sample of both states with the covariance `noise` (2, 2), of those before
+    it."""
     gain = p[:, :, PARAMETERS:] @ np.linalg.inv(p[:, PARAMETERS:, PARAMETERS:] + noise)
     remains = np.tile(np.eye(SIZE), (len(p), 1, 1))
     remains[:, :, PARAMETERS:] -= gain
@@ -76,7 +77,8 @@ def measured(p: Array, noise: Array) -> Array:
 
 
 def dynamics_gradient(batch: Batch, at: NDArray[np.int64], w: Array) -> Array:
-    """(B, T, 2, 3) of the logarithms of natural frequency and damping ratio by w (B, T, 3), at the samples `at`."""
+    """Return (B, T, 2, 3) of the logarithms of natural frequency and damping ratio by w (B, T, 3), at the samples
+    `at`."""
     angle = batch.rest(at)
 
     def logarithms(index: int, sign: float) -> Array:
@@ -89,7 +91,7 @@ def dynamics_gradient(batch: Batch, at: NDArray[np.int64], w: Array) -> Array:
 
 
 def with_dynamics(covariance: Array, gradient: Array) -> Array:
-    """(…, 5) variances of w and, to first order, of the logarithms of natural frequency and damping ratio.
+    """Return (…, 5) variances of w and, to first order, of the logarithms of natural frequency and damping ratio.
 
     `covariance` (…, 3, 3) of w, `gradient` (…, 2, 3) as of dynamics_gradient().
     """

@@ -46,7 +46,8 @@ def _called(frame: FrameType, event: str, argument: Any) -> None:
 
 
 def note_in(folder: str) -> str:
-    """What runs from now on, here and in processes started here, is noted in this folder; returns that of before."""
+    """Return what runs from now on, here and in processes started here, is noted in this folder; return that of
+    before."""
     global _folder
     before = _folder
     os.makedirs(folder, exist_ok=True)

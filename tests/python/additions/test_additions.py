@@ -182,7 +182,7 @@ class Copy:
         file.write_text(text.replace(old, new), encoding="utf-8")
 
     def lever(self, *arguments: str) -> str:
-        """What the command says, of this copy."""
+        """Return what the command says, of this copy."""
         environment = {**os.environ, LIBRARY_DIR: str(native_file("lever.dbc").parent), "COLUMNS": "200"}
         packages = os.pathsep.join(str(self.folder / name) for name in ("host_tools", "sil"))
         command = [sys.executable, "-c", RUN, packages, *arguments]

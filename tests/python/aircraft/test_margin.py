@@ -32,7 +32,7 @@ def table(coupled: Coupled, gain_sigma: float = 0.0, phase_sigma: float = 0.0, *
 
 
 def said(arm: FloatArray, sigma: float, watched: AircraftResponse) -> Stability:
-    """What the firmware says that has this arm for its first guess, and has seen nothing but a lever at rest."""
+    """Return what the firmware says that has this arm for its first guess, and has seen nothing but a lever at rest."""
     settings = dict(zip(NAMES, arm.tolist(), strict=True)) | {f"{name}_sigma": sigma for name in NAMES}
     estimator = Estimator(Config(settings={**settings, "publish_period": 1e-3}))
     estimator.watch(watched)

@@ -106,7 +106,8 @@ def test_a_fuselage_has_three_modes_at_most() -> None:
 
 
 def critical_by_eigenvalues(craft: Aircraft, truth: Truth) -> float:
-    """The gearing at which an eigenvalue of the closed loop crosses the imaginary axis; delay by Pade of order 12."""
+    """Return the gearing at which an eigenvalue of the closed loop crosses the imaginary axis; delay by Pade of
+    order 12."""
     airframe, transfer = craft.airframe(), truth.transfer(np.array([0]))
     hand = signal.tf2ss(transfer.numerator[0], transfer.denominator[0])
     w = 2.0 * math.pi * craft.actuator_bandwidth

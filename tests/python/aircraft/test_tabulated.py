@@ -20,7 +20,7 @@ FREQUENCY = np.geomspace(1.0, 10.0, 60)
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    """The response of a coupled aircraft, at 60 frequencies."""
+    """Return the response of a coupled aircraft, at 60 frequencies."""
     response = Coupled(aircraft.load("puma_like"), 0.4).response(2j * np.pi * FREQUENCY.astype(np.complex128))
     rows = (f"{f}, {z.real}, {z.imag}" for f, z in zip(FREQUENCY, response, strict=True))
     path = tmp_path / "response.csv"

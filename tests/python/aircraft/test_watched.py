@@ -70,7 +70,7 @@ def test_every_file_has_it(out: Path) -> None:
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A simulation of a scenario with an aircraft, and the replay of its log with the same."""
+    """Return a simulation of a scenario with an aircraft, and the replay of its log with the same."""
     folder = tmp_path_factory.mktemp("flown")
     cancelled = ("estimator.mitigation='cancellation'", "duration=8 s", "pilot.c_p=30 N s/m", "limits={}")
     overrides = [part for each in cancelled for part in ("--set", each)]

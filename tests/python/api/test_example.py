@@ -24,7 +24,7 @@ def test_the_notebook_runs(root: Path, tmp_path: Path) -> None:
 
 
 def shown(cell: str) -> str:
-    """A cell with its last expression printed, as a notebook shows it."""
+    """Return a cell with its last expression printed, as a notebook shows it."""
     tree = ast.parse(cell)
     last = tree.body[-1]
     if isinstance(last, ast.Expr):

@@ -24,7 +24,7 @@ WHOLE = CONTENTS + zlib.crc32(CONTENTS).to_bytes(4, "little")
 
 
 def elf(pieces: list[tuple[int, bytes]]) -> bytes:
-    """A 32-bit little-endian ELF file with a loaded segment for each piece."""
+    """Return a 32-bit little-endian ELF file with a loaded segment for each piece."""
     offset = 52 + 32 * len(pieces)
     headers, data = b"", b""
     for address, piece in pieces:
@@ -57,7 +57,7 @@ def image(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def stand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The only folder in which programs are found; a test puts in it what it wants to be installed."""
+    """Return the only folder in which programs are found; a test puts in it what it wants to be installed."""
     folder = tmp_path / "bin"
     folder.mkdir()
     monkeypatch.setenv("PATH", str(folder))
@@ -66,7 +66,8 @@ def stand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def install(folder: Path, name: str, says: str, status: int) -> Path:
-    """A program that notes its arguments, says something and ends with a status. Returns where the arguments are."""
+    """Return a program that notes its arguments, says something and ends with a status. Returns where the arguments
+    are."""
     arguments = folder / f"{name}.arguments"
     program = folder / name
     program.write_text(

@@ -41,7 +41,7 @@ def small(small_file: Path) -> Plan:
 
 @pytest.fixture(scope="session")
 def undisturbed(small: Plan, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    """The files of the small campaign: name to content."""
+    """Return the files of the small campaign: name to content."""
     folder = tmp_path_factory.mktemp("undisturbed")
     for number in range(small.count):
         chunks.make(small, small.chunk(number), folder)
@@ -61,5 +61,5 @@ def spec_of(tmp_path: Path) -> Callable[[str], Spec]:
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """The Parquet files of a folder."""
+    """Return the Parquet files of a folder."""
     return {file.name: file.read_bytes() for file in folder.glob("*.parquet")}

@@ -15,7 +15,7 @@ from python.conftest import Refused, Run
 
 @pytest.fixture
 def done(undisturbed: dict[str, bytes], tmp_path: Path) -> Path:
-    """A folder with the whole small campaign."""
+    """Return a folder with the whole small campaign."""
     for name, content in undisturbed.items():
         (tmp_path / name).write_bytes(content)
     return tmp_path

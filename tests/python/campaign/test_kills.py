@@ -24,7 +24,7 @@ PATIENCE = 120.0  # [s] until something is given up that takes a second on an id
 
 
 def until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None:
-    """Waits for it, while the process lives."""
+    """Wait for it, while the process lives."""
     end = time.monotonic() + PATIENCE
     while not condition():
         assert process.poll() is None, process.communicate()
@@ -40,7 +40,7 @@ def begin(*arguments: str | Path, start_new_session: bool = False) -> subprocess
 
 
 def workers(client: int) -> list[int]:
-    """The worker processes that a client has started."""
+    """Return the worker processes that a client has started."""
     children = Path(f"/proc/{client}/task/{client}/children").read_text().split()
     tasks = [path.read_text().split() for path in Path(f"/proc/{client}/task").glob("*/children")]
     found = {int(child) for each in (*tasks, children) for child in each}
@@ -56,7 +56,7 @@ def is_alive(pid: int) -> bool:
 
 @contextmanager
 def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """A Dask scheduler with a worker, as somebody starts them on a command line: its address, and its process."""
+    """Yield the address of a Dask scheduler and the process of its worker, started as on a command line."""
     dask = [sys.executable, "-m", "dask"]
     options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
     place: dict[str, Any] = {"cwd": folder.parent, "text": True, "stderr": subprocess.PIPE}

@@ -74,7 +74,7 @@ def test_the_band_holds_the_border_of_the_population() -> None:
 
 @pytest.fixture(scope="session")
 def folder(small: Plan, undisturbed: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The files of the small campaign."""
+    """Return the files of the small campaign."""
     place = tmp_path_factory.mktemp("small")
     for name, content in undisturbed.items():
         (place / name).write_bytes(content)
@@ -112,7 +112,7 @@ def test_a_run_whose_error_is_no_number_has_diverged(small: Plan, folder: Path, 
 
 @pytest.fixture(scope="session")
 def made_map(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
-    """The same with the axes the other way round, and one flight at each point."""
+    """Return the same with the axes the other way round, and one flight at each point."""
     place = tmp_path_factory.mktemp("map")
     head, noise, adaptation = (
         SMALL.replace("seeds = 4", "seeds = 1").replace("chunk = 1", "chunk = 6").split("[[vary]]")

@@ -53,7 +53,7 @@ class Client:
         return future
 
     def work(self) -> bool:
-        """Does all that was given; whether that was anything."""
+        """Do all that was given; whether that was anything."""
         given, self.given = self.given, []
         self.together.append(len(given))
         kills = any(chunk.first in self.killers for _, chunk in given)
@@ -68,7 +68,7 @@ class Client:
 def run(
     plan: Plan, killers: set[int], folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[session.Session, Client, list[tuple[int, int, str]]]:
-    """The session, its client, and the progress that was shown."""
+    """Return the session, its client, and the progress that was shown."""
     client = Client(plan, killers)
     shown: list[tuple[int, int, str]] = []
 

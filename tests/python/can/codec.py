@@ -22,35 +22,35 @@ TO_NAME |= {0x20: "SOME_LOST", 0x40: "WRONG_SEQUENCE"}
 
 
 def data_id_base(message: Message) -> int:
-    """The E2E data ID of counter 0."""
+    """Return the E2E data ID of counter 0."""
     assert message.dbc is not None
     return int(message.dbc.attributes["E2EDataIdBase"].value)
 
 
 def limits(signal: Signal) -> tuple[int, int]:
-    """Least and greatest raw value that the bits of a signal hold."""
+    """Return least and greatest raw value that the bits of a signal hold."""
     least = -(1 << signal.length - 1) if signal.is_signed else 0
     return least, least + (1 << signal.length) - 1
 
 
 def is_quantity(signal: Signal) -> bool:
-    """A physical value, as opposed to a code, flag or count."""
+    """Return a physical value, as opposed to a code, flag or count."""
     return signal.scale != 1
 
 
 def not_available(signal: Signal) -> int:
-    """The raw value that says so, of a quantity."""
+    """Return the raw value that says so, of a quantity."""
     least, greatest = limits(signal)
     return least if signal.is_signed else greatest
 
 
 def scaled(signal: Signal, raw: int) -> float:
-    """The physical value of a raw one, by cantools."""
+    """Return the physical value of a raw one, by cantools."""
     return float(cast(float, signal.raw_to_scaled(raw, decode_choices=False)))
 
 
 def build(folder: Path) -> Path:
-    """Compiles the codec in the folder into a shared library; beside it, with the suffix .cdef, what cffi needs."""
+    """Compile the codec in the folder into a shared library; beside it, with the suffix .cdef, what cffi needs."""
     compiler = shlex.split(os.environ.get("CC", "cc"))
     flags = ["-std=c99", "-ffp-contract=off", "-fno-math-errno", "-Wall", "-Wextra", "-Werror"]
     library = folder / "codec.so"
@@ -83,26 +83,26 @@ class Codec:
         self.lib: Any = self.ffi.dlopen(str(library))
 
     def enum(self, name: str) -> dict[str, int]:
-        """The constants of an enum."""
+        """Return the constants of an enum."""
         return dict(self.ffi.typeof(f"enum {name}").relements)
 
     def members(self, message: str) -> list[str]:
-        """The members of a message's struct."""
+        """Return the members of a message's struct."""
         return [name for name, _ in self.ffi.typeof(f"message_{message.lower()}_t").fields]
 
     def frame(self, frame_id: int, data: bytes) -> Any:
-        """A lever_frame_t."""
+        """Return a lever_frame_t."""
         return self.ffi.new("lever_frame_t *", {"id": frame_id, "length": len(data), "data": data.ljust(8, b"\0")})
 
     def encode(self, message: str, values: Mapping[str, Any]) -> bytes | None:
-        """The eight bytes, with CRC and counter 0; None if refused. Members that are not given are 0."""
+        """Return the eight bytes, with CRC and counter 0; None if refused. Members that are not given are 0."""
         frame = self.frame(0, bytes(8))
         struct = self.ffi.new(f"message_{message.lower()}_t *", dict(values))
         done = getattr(self.lib, f"message_{message.lower()}_encode")(frame, struct)
         return bytes(frame.data) if done else None
 
     def decode(self, message: str, data: bytes, frame_id: int | None = None) -> dict[str, Any] | None:
-        """The members of the message, which comes under its own identifier or another; None if refused."""
+        """Return the members of the message, which comes under its own identifier or another; None if refused."""
         frame = self.frame(getattr(self.lib, f"MESSAGE_{message}_ID") if frame_id is None else frame_id, data)
         struct = self.ffi.new(f"message_{message.lower()}_t *")
         if not getattr(self.lib, f"message_{message.lower()}_decode")(struct, frame):
@@ -118,7 +118,7 @@ class Codec:
     def receiver(
         self, data_id_base: int, max_delta_counter: int, max_no_new_or_repeated: int, sync_counter: int
     ) -> Any:
-        """A fresh e2e_receiver_t."""
+        """Return a fresh e2e_receiver_t."""
         receiver = self.ffi.new("e2e_receiver_t *")
         tolerance = self.ffi.new("e2e_tolerance_t *", [max_delta_counter, max_no_new_or_repeated, sync_counter])
         self.lib.e2e_receiver_init(receiver, data_id_base, tolerance[0])

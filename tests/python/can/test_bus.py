@@ -25,7 +25,7 @@ ToMessage = Callable[[Frame], can.Message]
 
 
 def seen(messages: list[can.Message]) -> list[tuple[float, int, bytes]]:
-    """What a log would show of messages."""
+    """Return what a log would show of messages."""
     return [(message.timestamp, message.arbitration_id, bytes(message.data)) for message in messages]
 
 

@@ -34,7 +34,7 @@ def crc15(bits: Iterable[int]) -> int:
 
 
 def bits_of(identifier: int, data: bytes) -> int:
-    """Of a classic frame with an 11-bit identifier on the bus, with its stuff bits."""
+    """Return the bits of of a classic frame with an 11-bit identifier on the bus, with its stuff bits."""
     content = f"0{identifier:011b}000{len(data):04b}" + "".join(f"{byte:08b}" for byte in data)
     content += f"{crc15(map(int, content)):015b}"
     stuffed, last, same = 0, "", 0
@@ -91,7 +91,7 @@ def load(period: float, only_estimate: bool, snapshots: float | None) -> float:
 
 
 def rows() -> dict[str, tuple[float, float]]:
-    """The table as it stands: at 1 kHz and at 500 Hz [%]."""
+    """Return the table as it stands: at 1 kHz and at 500 Hz [%]."""
     found = re.findall(r"^\| (.*?) \| (\d+) % \| (\d+) % \|$", README.read_text(encoding="utf-8"), re.MULTILINE)
     return {name: (float(fast), float(slow)) for name, fast, slow in found}
 

@@ -35,7 +35,7 @@ MODELS = {0: ("m_p", "c_p", "k_p"), 1: ("m", "c", "k"), 2: ("a21", "a22", "b21")
 
 
 def code(signal: Signal) -> float | None:
-    """What the code for "not available" is when it is scaled like a value; None where there is no such code."""
+    """Return what the code for "not available" is when it is scaled like a value; None where there is no such code."""
     for raw, name in (signal.choices or {}).items():
         if str(name) == "not_available":
             return float(raw) * float(signal.scale)
@@ -43,7 +43,8 @@ def code(signal: Signal) -> float | None:
 
 
 def contents(message: Message, field: Signal | None = None) -> dict[str, float]:
-    """A value inside the range of every field but the framing, of the model that has `field` if the message has all."""
+    """Return a value inside the range of every field but the framing, of the model that has `field` if the message
+    has all."""
     ids = (field.multiplexer_ids if field is not None else None) or [0]
     present = [signal for signal in message.signals if signal.multiplexer_ids in (None, ids)]
     values: dict[str, float] = {
@@ -55,7 +56,7 @@ def contents(message: Message, field: Signal | None = None) -> dict[str, float]:
 
 
 def fields() -> Iterator[tuple[Message, Signal]]:
-    """Every field that carries a physical value: neither framing, nor flag, nor code."""
+    """Yield every field that carries a physical value: neither framing, nor flag, nor code."""
     for message in MESSAGES.values():
         for signal in message.signals:
             if float(signal.scale) != 1.0:
@@ -67,7 +68,7 @@ FIELD_NAMES = [f"{message.name}.{signal.name}" for message, signal in FIELDS]
 
 
 def by_cantools(message: Message, values: dict[str, float], counter: int) -> bytes:
-    """The payload without its CRC byte."""
+    """Return the payload without its CRC byte."""
     return message.encode({**values, "crc": 0, "counter": counter}, strict=False)[1:]
 
 

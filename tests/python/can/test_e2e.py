@@ -110,7 +110,7 @@ class Channel:
         return bytes(self.sent)
 
     def receive(self) -> bytes | None:
-        """What arrives in the next cycle."""
+        """Return what arrives in the next cycle."""
         if self.dice.random() >= self.trouble:
             return self.send()
         match self.dice.choice(["lose", "repeat", "old", "corrupt", "silent"]):

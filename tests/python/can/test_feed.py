@@ -19,7 +19,7 @@ INPUTS = ("LEVER_SAMPLE", "BASE_SAMPLE", "COMMAND")
 
 
 def spoilt(lines: list[str]) -> list[str]:
-    """Frames lost, doubled, swapped, corrupt and cut; other messages and other buses between them."""
+    """Return frames lost, doubled, swapped, corrupt and cut; other messages and other buses between them."""
     random = np.random.default_rng(4)
     damaged = []
     for line in lines:
@@ -55,7 +55,7 @@ def spoilt_log(session: Session, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 
 def one_by_one(log: Path, session: Session) -> tuple[list[tuple[int, bytes]], Health]:
-    """What the estimator on a python-can bus answers, and its health at the end."""
+    """Return what the estimator on a python-can bus answers, and its health at the end."""
     answers = []
     with can.CanutilsLogReader(log) as reader, LeverBus("x", config=session.config) as bus:
         for message in reader:

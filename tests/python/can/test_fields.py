@@ -18,7 +18,7 @@ from python.conftest import Samples
 
 
 def columns(name: str, **values: Any) -> dict[str, float]:
-    """The columns of one frame."""
+    """Return the columns of one frame."""
     frame = codec.encode(name, 0, values)
     found = fields.columns(name, np.frombuffer(frame, np.uint8).reshape(1, 8))
     return {key: float(column[0]) for key, column in found.items()}
@@ -49,7 +49,7 @@ def test_frames_belong_to_the_sample_whose_low_bits_they_carry() -> None:
 
 
 def answers(estimator: Estimator, name: str) -> list[dict[str, float]]:
-    """What an estimator has to say, of one message."""
+    """Return what an estimator has to say, of one message."""
     frames = iter(estimator.next_frame, None)
     return [codec.decode(*frame)[1] for frame in frames if frame[0] == codec.message(name).frame_id]
 

@@ -35,7 +35,7 @@ def frames_of(*paths: Path) -> bulk.Frames:
 
 
 def convert(log: Path, into: Path, frames: int = 2000) -> None:
-    """The first frames of a log in another format, by python-can."""
+    """Write the first frames of a log in another format, by python-can."""
     with can.LogReader(log) as reader, can.Logger(into) as logger:
         for message in itertools.islice(reader, frames):
             logger.on_message_received(message)

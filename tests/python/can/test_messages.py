@@ -19,7 +19,7 @@ SWEEP = 500
 
 
 def fields(message: Message) -> list[Signal]:
-    """What the codec writes: all but CRC and counter."""
+    """Return what the codec writes: all but CRC and counter."""
     return [signal for signal in message.signals if signal.name not in ("crc", "counter")]
 
 
@@ -38,28 +38,28 @@ CODES = [
 
 
 def multiplexer(message: Message) -> str | None:
-    """The signal that says which others a frame has: model, or page."""
+    """Return the signal that says which others a frame has: model, or page."""
     return next((signal.name for signal in message.signals if signal.is_multiplexer), None)
 
 
 def signals_of(message: Message, page: int) -> list[Signal]:
-    """What a frame of this message has, with this value of the multiplexer if there is one."""
+    """Return what a frame of this message has, with this value of the multiplexer if there is one."""
     return [signal for signal in message.signals if signal.multiplexer_ids in (None, [page])]
 
 
 def parameters_of(message: Message, model: int) -> list[str]:
-    """The multiplexed signals of a model, in their order."""
+    """Return the multiplexed signals of a model, in their order."""
     return [signal.name for signal in signals_of(message, model) if signal.multiplexer_ids]
 
 
 def faults_of(values: dict[str, Any]) -> int:
-    """The fault bits of HEALTH as one number."""
+    """Return the fault bits of HEALTH as one number."""
     signals = DBC.get_message_by_name("HEALTH").signals
     return sum(values.get(s.name, 0) << s.start - 16 for s in signals if s.name.startswith("fault_"))
 
 
 def as_members(message: Message, values: dict[str, Any]) -> dict[str, Any]:
-    """The members of the struct that has these signals."""
+    """Return the members of the struct that has these signals."""
     array = MULTIPLEXED.get(message.name)
     if message.name == "HEALTH":
         others = {name: value for name, value in values.items() if not name.startswith("fault_")}
@@ -71,7 +71,7 @@ def as_members(message: Message, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def as_signals(message: Message, members: dict[str, Any]) -> dict[str, Any]:
-    """The signals that a struct with these members has."""
+    """Return the signals that a struct with these members has."""
     array = MULTIPLEXED.get(message.name)
     if message.name == "HEALTH":
         bits = {s.name: members["faults"] >> s.start - 16 & 1 for s in message.signals if s.name.startswith("fault_")}
@@ -85,7 +85,8 @@ def as_signals(message: Message, members: dict[str, Any]) -> dict[str, Any]:
 
 
 def raw_of(signal: Signal, value: float) -> int:
-    """The count of a physical value by cantools, or that for not available when it does not fit (COMMAND: keep)."""
+    """Return the count of a physical value by cantools, or that for not available when it does not fit (COMMAND:
+    keep)."""
     least, greatest = (scaled(signal, raw) for raw in limits(signal))
     half = 0.5 * signal.scale
     if math.isnan(value) or not least - half < value < greatest + half:
@@ -105,7 +106,7 @@ def cantools_encode(message: Message, values: dict[str, Any]) -> bytes:
 
 
 def context(message: Message, signal: Signal) -> dict[str, Any]:
-    """What must be set for a signal to be sent: its flag, or the model or page that has it."""
+    """Return what must be set for a signal to be sent: its flag, or the model or page that has it."""
     mux = multiplexer(message)
     if mux is not None and signal.multiplexer_ids:
         return {mux: signal.multiplexer_ids[0]}
@@ -114,7 +115,7 @@ def context(message: Message, signal: Signal) -> dict[str, Any]:
 
 
 def encode_one(codec: Codec, message: Message, signal: Signal, value: float) -> tuple[bytes | None, bytes]:
-    """What the C and what cantools make of one value."""
+    """Return what the C and what cantools make of one value."""
     values = {signal.name: value} | context(message, signal)
     return codec.encode(message.name, as_members(message, values)), cantools_encode(message, values)
 
@@ -156,7 +157,8 @@ def test_codes_that_do_not_fit_are_refused(codec: Codec, message: Message, signa
 
 
 def random_values(message: Message, dice: random.Random) -> dict[str, Any]:
-    """Values up to 10 % beyond the range of each signal, none within 0.01 counts of a tie (where the rule differs)."""
+    """Return values up to 10 % beyond the range of each signal, none within 0.01 counts of a tie (where the rule
+    differs)."""
     values: dict[str, Any] = {}
     page = dice.choice([*{signal.multiplexer_ids[0] for signal in message.signals if signal.multiplexer_ids}] or [0])
     for signal in signals_of(message, page)[2:]:
@@ -195,7 +197,7 @@ def test_random_values_both_ways(codec: Codec, message: Message) -> None:
 
 
 def decoded_value(message: Message, name: str, raw: dict[str, int]) -> float:
-    """What the C makes of raw values: the float nearest to a quantity, no flag without a value."""
+    """Return what the C makes of raw values: the float nearest to a quantity, no flag without a value."""
     signal = message.get_signal_by_name(name)
     if is_quantity(signal):
         missing = raw[name] == not_available(signal) and message.name != "COMMAND"

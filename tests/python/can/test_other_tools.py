@@ -31,7 +31,7 @@ def random_frames(name: str) -> NDArray[np.uint8]:
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The frames of all messages, one message after the other, as candump -L writes them."""
+    """Return the frames of all messages, one message after the other, as candump -L writes them."""
     path = tmp_path_factory.mktemp("log") / "x.log"
     with path.open("w", encoding="ascii") as lines:
         for name in NAMES:
@@ -42,7 +42,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def wireshark(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """An environment whose configuration of Wireshark has the profile lever."""
+    """Return an environment whose configuration of Wireshark has the profile lever."""
     folder = tmp_path_factory.mktemp("config")
     assert cli.main(["dbc", "--wireshark", str(folder / "wireshark/profiles/lever")]) == 0
     return os.environ | {"XDG_CONFIG_HOME": str(folder)}

@@ -16,7 +16,7 @@ from processes import PATIENCE
 
 @pytest.fixture
 def line() -> Iterator[tuple[int, str]]:
-    """A pseudo-terminal: the end to write to, and the path of the other."""
+    """Yield a pseudo-terminal: the end to write to, and the path of the other."""
     end, other = os.openpty()
     tty.setraw(other)
     yield end, os.ttyname(other)

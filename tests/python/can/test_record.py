@@ -65,7 +65,7 @@ def record(path: Path, frames: list[can.Message], end: Callable[[], None] = ctrl
 
 
 def messages(session: Session, count: int) -> list[can.Message]:
-    """The first ones of the log."""
+    """Return the first ones of the log."""
     with can.CanutilsLogReader(session.log) as reader:
         return list(itertools.islice(reader, count))
 

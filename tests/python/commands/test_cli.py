@@ -27,7 +27,7 @@ LEVER = [sys.executable, "-m", "lever_cdkf.cli"]
 
 
 def entry(name: str, load: Any) -> Any:
-    """An entry point as importlib.metadata finds it."""
+    """Return an entry point as importlib.metadata finds it."""
 
     class Entry(SimpleNamespace):
         def __lt__(self, other: Any) -> bool:
@@ -38,14 +38,14 @@ def entry(name: str, load: Any) -> Any:
 
 @pytest.fixture
 def commands(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """The commands that `lever` finds: those of host_tools, and what a test adds."""
+    """Return the commands that `lever` finds: those of host_tools, and what a test adds."""
     found = [entry("settings", lambda: settings), entry("dbc", lambda: dbc)]
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found if group == cli.COMMANDS else [])
     return found
 
 
 def command_that(raises: BaseException) -> Any:
-    """A module with the command `act`."""
+    """Return a module with the command `act`."""
 
     def run(_args: argparse.Namespace) -> int:
         raise raises

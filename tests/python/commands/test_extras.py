@@ -70,7 +70,7 @@ def test_the_extras_are_those_of_pyproject(root: Path) -> None:
 
 
 def packages(extras: dict[str, list[str]], extra: str) -> list[str]:
-    """The names of its packages, and of those of the extras it has in it."""
+    """Return the names of its packages, and of those of the extras it has in it."""
     found: list[str] = []
     for requirement in extras[extra]:
         inner = re.fullmatch(r"lever-cdkf\[(\w+)\]", requirement)

@@ -42,13 +42,13 @@ ROWS: list[Row] = [
 
 
 def columns(line: str) -> int:
-    """Of a terminal: combining letters take none."""
+    """Return the columns of a terminal: combining letters take none."""
     return sum(not unicodedata.combining(letter) for letter in line)
 
 
 @pytest.fixture
 def shown(installed: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Shown:
-    """What a command prints on a terminal of some width."""
+    """Return what a command prints on a terminal of some width."""
     assert installed
 
     def run(*arguments: str, width: int = 80) -> str:
@@ -60,7 +60,7 @@ def shown(installed: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytes
 
 
 def read_all(terminal: int) -> str:
-    """What is written to a terminal until all have closed it."""
+    """Return what is written to a terminal until all have closed it."""
     text = b""
     with open(terminal, "rb", buffering=0) as stream, contextlib.suppress(OSError):
         while piece := stream.read(65536):

@@ -54,7 +54,8 @@ def test_the_reduced_table_holds(
 
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A table of three short rows: one cannot hold, one needs a setting that is unknown, and one is reported."""
+    """Replace the table by three short rows: one cannot hold, one needs a setting that is unknown, and one is
+    reported."""
     motion = Motion(duration=3.0)
     rows = (
         Condition("missed", "title", motion, (Limit("f_n rms", most=-1.0),), start=1.0),

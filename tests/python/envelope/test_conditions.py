@@ -172,7 +172,7 @@ TOLD = {
 
 
 def different(of: Motion | Sensors | Condition, plain: Motion | Sensors | Condition) -> dict[str, Any]:
-    """What is not as usual, but for what is made of others, or words."""
+    """Return what is not as usual, but for what is made of others, or words."""
     names = {field.name for field in fields(of)} - {
         "name", "title", "motion", "sensors", "limits", "unless", "settings", "also", "quick", "closed_loop", "faults",
     }  # fmt: skip

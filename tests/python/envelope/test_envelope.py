@@ -316,7 +316,7 @@ def test_a_sample_comes_each_sample_period_and_has_the_time_of_its_senders_clock
 
 
 def outcome(error: dict[str, FloatArray] | None = None, faults: FloatArray | None = None) -> Outcome:
-    """Two runs of 20 s whose truth is 1 and whose σ is 0.1, with these errors and faults of the first."""
+    """Return two runs of 20 s whose truth is 1 and whose σ is 0.1, with these errors and faults of the first."""
     time, first = np.arange(0.0, 20.0, 0.01), np.array((1.0, 0.0))
     nothing = np.zeros((len(time), 2))
     truth, sigma = (dict.fromkeys(measure.QUANTITIES, nothing + each) for each in (1.0, 0.1))

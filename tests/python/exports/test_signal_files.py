@@ -44,7 +44,7 @@ class Replayed:
     dbc: Any
 
     def frames(self, name: str) -> list[tuple[int, dict[str, Any]]]:
-        """Time [us since 1970] and signals of a message, decoded by cantools."""
+        """Return time [us since 1970] and signals of a message, decoded by cantools."""
         message = self.dbc.get_message_by_name(name)
         rows = (line.split() for line in self.log.read_text().splitlines())
         return [

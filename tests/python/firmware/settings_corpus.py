@@ -11,7 +11,7 @@ _LONG = [("good", _BOM + _LONGEST + b"\r\n" + _LONGEST), ("bad", _LONGEST + b" "
 
 
 def corpus() -> list[tuple[str, bytes]]:
-    """How each file is taken, "good", "bad" or "not_cmake", and what is in it."""
+    """Return how each file is taken, "good", "bad" or "not_cmake", and what is in it."""
     lines = [line for line in CORPUS.read_text(encoding="ascii").splitlines() if line and line[0] != "#"]
     split = [line.partition(" ")[::2] for line in lines]
     files = [(verdict, text.strip(" ").encode().decode("unicode_escape").encode("latin-1")) for verdict, text in split]

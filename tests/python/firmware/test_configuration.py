@@ -17,14 +17,14 @@ ROWS = settings_table()
 
 @pytest.fixture
 def config() -> Any:
-    """A lever_config_t with the defaults."""
+    """Return a lever_config_t with the defaults."""
     config = ffi.new("lever_config_t *")
     lib.lever_config_default(config)
     return config
 
 
 def refused(config: Any) -> str | None:
-    """What is wrong with it, by name; None if it is accepted. lever_init() is of the same opinion."""
+    """Return what is wrong with it, by name; None if it is accepted. lever_init() is of the same opinion."""
     name = lib.lever_config_check(config)
     memory = ffi.new("lever_memory_t *")
     assert (lib.lever_init(memory, config) == ffi.NULL) == (name != ffi.NULL)

@@ -37,7 +37,7 @@ PLANTS = {"lever": LEVER, "linear_black_box": LEVER, "linear_physical": (2.5, 42
 
 
 def swing(estimator: Estimator, plant: tuple[float, float, float, float], seconds: float) -> None:
-    """A plant shaken at random, integrated by small steps."""
+    """Shake a plant at random, integrated by small steps."""
     inertia, damping, stiffness, forcing = plant
     rng = np.random.default_rng(4)
     noise = np.convolve(rng.standard_normal(round(seconds * 1000) + 60), np.hanning(60) / 4.0, "valid")

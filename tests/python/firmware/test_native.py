@@ -31,7 +31,7 @@ DEFAULTS = {
 
 
 def recording(count: int, seed: int = 0) -> dict[str, Any]:
-    """Samples of a swinging lever at 1 kHz, a tenth of them without theta."""
+    """Return samples of a swinging lever at 1 kHz, a tenth of them without theta."""
     random = np.random.default_rng(seed)
     time = np.arange(count) * 1e-3
     theta = 0.35 + 0.02 * np.sin(2.0 * np.pi * 3.0 * time) + 1e-3 * random.standard_normal(count)
@@ -46,7 +46,7 @@ def recording(count: int, seed: int = 0) -> dict[str, Any]:
 
 
 def feed(estimator: Estimator, samples: dict[str, Any], index: int) -> str:
-    """One sample of a recording; NaN is missing."""
+    """Return one sample of a recording; NaN is missing."""
     values = {name: float(samples[name][index]) for name in ("theta", "theta_dot", "tau_m", "z_ddot")}
     present: dict[str, Any] = {name: None if math.isnan(value) else value for name, value in values.items()}
     return estimator.update(int(samples["time_us"][index]), **present)

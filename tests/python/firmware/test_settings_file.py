@@ -22,7 +22,7 @@ from python.firmware.settings_corpus import corpus
 
 
 def odd_config() -> Config:
-    """Every setting off its default, with digits that need single precision to the last bit."""
+    """Return every setting off its default, with digits that need single precision to the last bit."""
     settings = {row.name: row.least + (row.greatest - row.least) / 3.0 for row in settings_table()}
     settings |= {"dither_low": 1.2345678, "dither_high": 12.345679, "theta_process_noise": 1.2345e-7}
     return Config(preload="fixed", adaptation="annealing", settings=settings)
@@ -94,7 +94,7 @@ RANDOM_FILES = 5000
 
 
 def bits(assignments: dict[str, str | float]) -> str:
-    """What settings_reader.c prints for the defaults with these assignments."""
+    """Return what settings_reader.c prints for the defaults with these assignments."""
     values = {**Config().choices, **{row.name: row.default for row in settings_table()}, **assignments}
     choices = [str(choice_value(f"lever_{what}", what, str(values[what]))) for what in CHOICES]
     numbers = [struct.pack(">f", single(float(values[row.name]))).hex() for row in settings_table()]

@@ -48,7 +48,7 @@ int main(void)
 
 
 def leaves(die: Any, name: str, offset: int) -> Iterator[tuple[str, range]]:
-    """The members of a type that have none themselves, with the bytes that each has."""
+    """Yield the members of a type that have none themselves, with the bytes that each has."""
     kind = die.tag.removeprefix("DW_TAG_")
     if kind in ("typedef", "const_type"):
         yield from leaves(die.get_DIE_from_attribute("DW_AT_type"), name, offset)

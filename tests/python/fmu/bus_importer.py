@@ -17,7 +17,7 @@ NOTIFICATIONS = "org.fmi_standard.fmi_ls_bus.Can_BusNotifications"
 
 
 def operation(code: int, arguments: bytes) -> bytes:
-    """Code and length, 4 bytes each, little-endian; the length is that of the whole operation."""
+    """Return code and length, 4 bytes each, little-endian; the length is that of the whole operation."""
     return struct.pack("<II", code, 8 + len(arguments)) + arguments
 
 
@@ -27,7 +27,7 @@ def transmit(identifier: int, data: bytes, extended: int = 0, remote: int = 0) -
 
 
 def operations(content: bytes) -> Iterator[tuple[int, bytes]]:
-    """Code and arguments of each operation."""
+    """Yield code and arguments of each operation."""
     while content:
         code, length = struct.unpack_from("<II", content)
         assert 8 <= length <= len(content)
@@ -36,7 +36,7 @@ def operations(content: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def frames(content: bytes) -> list[Frame]:
-    """What CAN Transmit operations hold: data frames with identifiers of 11 bits."""
+    """Return what CAN Transmit operations hold: data frames with identifiers of 11 bits."""
     found = []
     for code, arguments in operations(content):
         if code == TRANSMIT:
@@ -91,7 +91,7 @@ class BusInstance:
         self.slave.enterStepMode()
 
     def step(self, step: float) -> bytes:
-        """Ends in event mode, with what the FMU sends: nothing, unless its clock ticks."""
+        """Return ends in event mode, with what the FMU sends: nothing, unless its clock ticks."""
         event, terminate, early, time = self.slave.doStep(
             currentCommunicationPoint=self.time, communicationStepSize=step
         )
@@ -107,7 +107,7 @@ class BusInstance:
         return bytes(sent)
 
     def exchange(self, received: Iterable[Frame], step: float = 0.001) -> bytes:
-        """What the FMU sends at the end of a step at whose beginning it has received frames."""
+        """Return what the FMU sends at the end of a step at whose beginning it has received frames."""
         self.receive(b"".join(transmit(*frame) for frame in received))
         return self.step(step)
 

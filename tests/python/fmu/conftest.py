@@ -11,7 +11,7 @@ from python.fmu.importer import unpacked
 
 @pytest.fixture(scope="session")
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with lever.fmu and pilot.fmu, with two seeds of the scenario demo."""
+    """Return a folder with lever.fmu and pilot.fmu, with two seeds of the scenario demo."""
     folder = tmp_path_factory.mktemp("fmus")
     assert cli.main(["fmu", "controller", "-o", str(folder / "lever.fmu")]) == 0
     assert cli.main(["fmu", "pilot", "-o", str(folder / "pilot.fmu"), "--seeds", "2"]) == 0

@@ -82,7 +82,7 @@ class Instance:
         self.slave.doStep(currentCommunicationPoint=time, communicationStepSize=self.period if step is None else step)
 
     def outputs(self) -> tuple[str, ...]:
-        """Names of all outputs."""
+        """Return names of all outputs."""
         return tuple(each.name for each in self.description.modelVariables if each.causality == "output")
 
     def close(self) -> None:
@@ -112,7 +112,7 @@ class Loop:
 
 
 def _grouped(instance: Instance, names: Iterable[str]) -> dict[str, tuple[list[str], list[int]]]:
-    """Names and value references by type."""
+    """Return names and value references by type."""
     groups: dict[str, tuple[list[str], list[int]]] = {}
     for name in names:
         group = groups.setdefault(instance.kind[name], ([], []))
@@ -122,7 +122,7 @@ def _grouped(instance: Instance, names: Iterable[str]) -> dict[str, tuple[list[s
 
 
 def unpacked(fmu: Path, folder: Path) -> Path:
-    """The folder with what an FMU holds."""
+    """Return the folder with what an FMU holds."""
     return Path(extract(str(fmu), unzipdir=str(folder)))
 
 

@@ -30,7 +30,8 @@ CONFIGURATIONS = [(ls_bus.CONFIGURATION, struct.pack("<BI", 1, 1_000_000)), (ls_
 
 @pytest.fixture(scope="session")
 def flight() -> list[tuple[list[Frame], list[Frame]]]:
-    """Of each sample of four seconds with dither: frames to the estimator, and what it answers in this process."""
+    """Return the flight of each sample of four seconds with dither: frames to the estimator, and what it answers in
+    this process."""
     traffic = in_process.run(load("demo", ["duration=4 s"])).traffic
     inputs = {codec.message(name).frame_id for name in TO_ESTIMATOR}
     samples: list[tuple[list[Frame], list[Frame]]] = [([], []) for _ in range(4000)]
@@ -160,7 +161,7 @@ def test_what_is_no_operation_is_a_format_error(
 
 
 def bus_error(sender: int, first: int = 1) -> bytes:
-    """Of a STATE_ESTIMATE, a bit error."""
+    """Return the bus error of a STATE_ESTIMATE, a bit error."""
     return operation(ls_bus.BUS_ERROR, struct.pack("<IBBB", 0x210, 1, first, sender))
 
 

@@ -88,7 +88,7 @@ class Traffic:
             yield identifier, self.random.bytes(int(self.random.integers(9)))
 
     def groups(self) -> Iterator[list[Frame]]:
-        """What is sent in each millisecond; no two samples in a row are lost, so that nobody tells of silence."""
+        """Yield what is sent in each millisecond; no two samples in a row are lost, so that nobody tells of silence."""
         for k in range(GROUPS):
             sample = self.sample(k)
             self.lost = not self.lost and self.chance(0.01)
@@ -102,7 +102,7 @@ class Traffic:
 
 @pytest.fixture(scope="module")
 def answered() -> list[tuple[list[Frame], list[Frame]]]:
-    """Of each group: its frames, and what the firmware in this process answers."""
+    """Return the answered of each group: its frames, and what the firmware in this process answers."""
     said = []
     with LeverBus(settings=rig.SETTINGS) as bus:
         for received in Traffic(seed=1).groups():

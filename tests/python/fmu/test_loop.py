@@ -29,7 +29,7 @@ def test_fmpy_finds_nothing_wrong(name: str, fmus: Path) -> None:
 
 
 def compared(scenario: Scenario, loop: Loop) -> list[str]:
-    """What differs from `lever sim` in a whole run."""
+    """Return what differs from `lever sim` in a whole run."""
     count = len(scenario.time())
     true, estimate = np.empty((count, len(TRUE))), np.empty((count, len(CONTROLLED) + len(SIGMA) + 1))
     references = [loop.pilot.reference[name] for name in TRUE]

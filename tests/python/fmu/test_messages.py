@@ -17,7 +17,7 @@ SIGNALS = {"theta": 0.3, "theta_dot": 0.0, "z_ddot": 0.0, "tau_m": 0.0}
 
 
 def status_of(call: Callable[[], object]) -> int:
-    """What FMPy says that a call has returned."""
+    """Return what FMPy says that a call has returned."""
     with pytest.raises(FMICallException) as caught:
         call()
     return int(caught.value.status)

@@ -21,7 +21,7 @@ both = pytest.mark.parametrize("case", [PHYSICAL, BLACK_BOX], ids=["physical", "
 
 
 def exact(system: Array, drive: float, x: Array, t: float) -> Array:
-    """The state t [s] later of x' = A x + [0, drive], from one matrix exponential."""
+    """Return the state t [s] later of x' = A x + [0, drive], from one matrix exponential."""
     augmented = np.zeros((3, 3))
     augmented[:2, :2], augmented[1, 2] = system, drive
     later: Array = (expm(augmented * t) @ np.append(x, 1.0))[:2]

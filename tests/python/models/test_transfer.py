@@ -17,7 +17,7 @@ def mode(frequency: float, ratio: float) -> np.ndarray:
 
 
 def parallel(*parts: tuple[float, float, float]) -> Transfer:
-    """The sum of gain / mode(frequency, ratio) over (gain, frequency, ratio)."""
+    """Return the sum of gain / mode(frequency, ratio) over (gain, frequency, ratio)."""
     denominator = np.array([1.0])
     for _, frequency, ratio in parts:
         denominator = np.polymul(denominator, mode(frequency, ratio))

@@ -24,13 +24,13 @@ OF = (
 
 @functools.cache
 def digest() -> str:
-    """Of all that the values depend on."""
+    """Return the digest of all that the values depend on."""
     files = sorted(file for pattern in OF for file in ROOT.glob(pattern))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()[:16]
 
 
 def values_of(name: str, calculate: Callable[[], dict[str, Array]]) -> dict[str, Array]:
-    """Those of a case, calculated unless they are there already; under a mutant always."""
+    """Return those of a case, calculated unless they are there already; under a mutant always."""
     file = FOLDER / digest() / f"{name}.npz"
     if "MUTANT_OF" in os.environ:
         return calculate()

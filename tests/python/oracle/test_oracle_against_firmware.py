@@ -49,7 +49,7 @@ def single(values: Array) -> Array:
 
 
 def band_limited(rng: np.random.Generator, count: int, rms: float) -> Array:
-    """Noise between 1 and 10 Hz at 1 kHz."""
+    """Return noise between 1 and 10 Hz at 1 kHz."""
     frequency = np.fft.rfftfreq(count, 1e-3)
     inside = (frequency > 1.0) & (frequency < 10.0)
     spectrum = inside * np.exp(2j * np.pi * rng.random(frequency.size))
@@ -59,15 +59,16 @@ def band_limited(rng: np.random.Generator, count: int, rms: float) -> Array:
 
 
 def grip_force(before: Array, after: Array, z_ddot: float, tau_m: float) -> float:
-    """Of the hand of such a lever [N], but for what is constant: 0.081 kg m^2, 0.27 kg m, 0.5 N m s/rad, 5 N m/rad."""
+    """Return the grip force of the hand of such a lever [N], but for what is constant: 0.081 kg m^2, 0.27 kg m, 0.5
+    N m s/rad, 5 N m/rad."""
     own = 0.08075 * (after[1] - before[1]) / 1e-3 + 0.5 * before[1] + 5.0 * before[0]
     return float((own + 0.27 * np.cos(before[0]) * z_ddot - tau_m)[0]) / 0.45
 
 
 @functools.cache
 def recorded(model: str, preload: str, seconds: float) -> dict[str, Array]:
-    """A pilot who stiffens by 60 % near the end. Before: a spike of each output; sensors that drop out, one, both, the
-    other, then the base; three gaps.
+    """Return a pilot who stiffens by 60 % near the end. Before: a spike of each output; sensors that drop out, one,
+    both, the other, then the base; three gaps.
 
     The base: for 2 % of the time, then for 4 ms. The gaps: of 5 ms; of 15 ms, more samples than a gap has predictions;
     of 30 ms, which is an outage.
@@ -151,7 +152,8 @@ CASES = (
 
 
 def assert_found(faults: Array, samples: dict[str, Array], first: int, flags: tuple[str, ...]) -> None:
-    """The firmware raised `flags`, and found nothing of what the oracle does not judge: sensors wrong, hands off."""
+    """Assert that the firmware raised `flags`, and found nothing of what the oracle does not judge: sensors wrong,
+    hands off."""
     bits = {name: bit for bit, name in enum_names("lever_fault").items()}
     for name in flags:
         assert (faults & bits[name]).any(), name

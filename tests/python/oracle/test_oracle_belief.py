@@ -58,7 +58,7 @@ class Linear:
         self.reference.R = OUTPUT @ OUTPUT.T
 
     def sample(self, missing: float = 0.0) -> None:
-        """A prediction and an update of both, each output missing with that probability."""
+        """Predict and update both with a sample, each output missing with that probability."""
         self.reference.F[4, :3] = 0.03 * self.rng.standard_normal(3)
         self.belief.predict(pushed(self.reference.F[3:, :3], np.zeros((3, 1))), PROCESS)
         self.reference.predict()
@@ -158,7 +158,7 @@ def test_considered_errors_are_what_an_unknown_push_makes(form: str) -> None:
 
 
 def curved(index: int) -> Motion:
-    """A motion that is linear in nothing."""
+    """Return a motion that is linear in nothing."""
 
     def motion(x: Array, w: Array) -> Array:
         push = 0.3 * np.sin(0.1 * index) * np.exp(w[0]) - 0.02 * np.exp(w[1]) * x[1]

@@ -46,7 +46,7 @@ class Case:
 
 
 def band_limited(seed: int, rms: float, delay: float = 0.0) -> Array:
-    """Noise between 1.5 and 10 Hz, `delay` [s] late."""
+    """Return noise between 1.5 and 10 Hz, `delay` [s] late."""
     frequency = np.fft.rfftfreq(COUNT, 1e-3)
     inside = (frequency > 1.5) & (frequency < 10.0)
     spectrum = inside * np.exp(2j * np.pi * np.random.default_rng(seed).random(frequency.size))
@@ -76,7 +76,7 @@ def moved(model: str, preload: str, torque: float) -> Array:
 
 
 def measured(case: Case, wrong: str = "", by: float = 0.0) -> dict[str, Array]:
-    """What sensors show of which one, or the lever's friction, is wrong."""
+    """Return what sensors show of which one, or the lever's friction, is wrong."""
     error = dict.fromkeys(STEPS, 0.0) | ({wrong: by} if wrong else {})
     y = moved(case.model, case.preload, case.torque)[:, :, 1 + int(np.sign(error["lever_friction"]))]
     base = (1.0 + error["z_ddot_gain"]) * band_limited(2, 1.0, error["z_ddot_delay"])
@@ -93,7 +93,7 @@ def estimates(case: Case, samples: dict[str, Array], **sigma: float) -> dict[str
 
 
 def logarithmic_covariance(found: dict[str, Array]) -> Array:
-    """Of the logarithms of the parameters (times, 3, 3)."""
+    """Return the logarithmic covariance of the logarithms of the parameters (times, 3, 3)."""
     correlation = np.tile(np.eye(3), (len(AT), 1, 1))
     for pair, (i, j) in enumerate(((0, 1), (0, 2), (1, 2))):
         correlation[:, i, j] = correlation[:, j, i] = found["parameter_correlation"][:, pair]

@@ -28,7 +28,7 @@ START = Start(np.array([0.35, 0.0]), np.diag([1e-3, 1e-2]), 0.35)
 
 
 def recorded(count: int, pilot: Array = PILOT) -> dict[str, Array]:
-    """Samples of a pilot on a shaking floor, with the motor helping, at 1 kHz."""
+    """Return samples of a pilot on a shaking floor, with the motor helping, at 1 kHz."""
     rng = np.random.default_rng(42)
     time = np.arange(count) * 1e-3
     lever, x = Lever.from_settings(SETTINGS, "fixed"), START.state[:, None]
@@ -61,7 +61,7 @@ def estimate(estimator: Estimator) -> Array:
 
 
 def process_covariance(t: float) -> Array:
-    """What a step of t [s] adds to [w; x]: random walks of w, and a random walk of θ̇ with its integral in θ."""
+    """Return what a step of t [s] adds to [w; x]: random walks of w, and a random walk of θ̇ with its integral in θ."""
     covariance = np.diag([*(SETTINGS[f"{name}_walk"] ** 2 * t for name in ("m_p", "c_p", "k_p")), 0.0, 0.0])
     power = SETTINGS["theta_dot_process_noise"] ** 2
     covariance[3:, 3:] = power * np.array([[t**3 / 3, t**2 / 2], [t**2 / 2, t]])

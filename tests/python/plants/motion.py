@@ -30,13 +30,14 @@ def body(
     substeps: int | None = None,
     disturbance: FloatArray | float = 0.0,
 ) -> Any:
-    """The Body of a truth; typed as anything, since tests set the states of those that have some of their own."""
+    """Return the Body of a truth; typed as anything, since tests set the states of those that have some of their
+    own."""
     z_ddot = np.broadcast_to(base, len(truth.rest)).astype(np.float64)
     return truth.body(Conditions(z_ddot, PERIOD, noise, lag, np.random.default_rng(1), substeps, disturbance))
 
 
 def moved(body: Body, count: int, command: float = 0.0) -> FloatArray:
-    """(samples, 2): theta - trim and theta_dot."""
+    """Return (samples, 2): theta - trim and theta_dot."""
     path = [(body.theta, body.theta_dot)]
     for _ in range(count - 1):
         body.advance(command)

@@ -65,7 +65,7 @@ def test_only_the_dropouts_of_that_value_count_and_they_add_up() -> None:
 
 
 def faulty(*faults: Fault) -> NDArray[np.float64]:
-    """What a sensor with these faults makes of the readings sin(t) + 2."""
+    """Return what a sensor with these faults makes of the readings sin(t) + 2."""
     return Sensor(fault=faults).corruption(TIME, rng()).of(np.sin(TIME) + 2.0)
 
 

@@ -21,7 +21,8 @@ def held(arm: tuple[float, ...] = ARM, count: int = 2) -> TwoDof:
 
 
 def state_space(arm: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """A (4, 4) and B (4,) by z_ddot of the Lagrangian's linearisation at rest; states theta, s, theta_dot, s_dot."""
+    """Return a (4, 4) and B (4,) by z_ddot of the Lagrangian's linearisation at rest; states theta, s, theta_dot,
+    s_dot."""
     slopes = lagrange(True)[1](TRIM, 0, 0, 0, *arm, *TRUNK, 0, 0, TRIM)
     return np.vstack((np.eye(4)[2:], slopes[:, :4])), np.array([0, 0, *slopes[:, 4]])
 

@@ -33,7 +33,7 @@ ALL = ("--format", ",".join(FORMATS))
 
 @pytest.fixture(scope="module", autouse=True)
 def _date() -> Iterator[None]:
-    """The date that all files say."""
+    """Yield the date that all files say."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
         yield
@@ -47,7 +47,7 @@ def replayed(out: Path, *arguments: str | Path) -> Summary:
 
 
 def settings_of(session: Session, folder: Path) -> Path:
-    """The settings file that the simulation's firmware had."""
+    """Return the settings file that the simulation's firmware had."""
     path = folder / "session.settings"
     values = session.config.choices | session.config.settings
     path.write_text("".join(f"{name} = {value}\n" for name, value in values.items()))
@@ -61,7 +61,7 @@ def replay(session: Session, tmp_path_factory: pytest.TempPathFactory) -> tuple[
 
 
 def estimates(log: Path) -> list[tuple[str, str]]:
-    """Identifier and data of the estimator's frames in a log."""
+    """Return identifier and data of the estimator's frames in a log."""
     frames = [line.split()[2].split("#") for line in log.read_text().splitlines()]
     return [(identifier, data) for identifier, data in frames if identifier[0] == "2"]
 
@@ -81,7 +81,7 @@ def test_the_log_of_a_simulation_is_reproduced_to_the_byte(name: str, tmp_path: 
 
 
 def columns(path: Path) -> dict[str, tuple[str, ...]]:
-    """The text of each column of a trace.csv."""
+    """Return the text of each column of a trace.csv."""
     with path.open(newline="") as file:
         header, *rows = csv.reader(file)
     return dict(zip(header, zip(*rows, strict=True), strict=True))

@@ -25,7 +25,7 @@ FLIPS = int(os.environ.get("LEVER_CUTS", "25"))
 
 
 def flight(scenario: Scenario) -> list[str]:
-    """Its log, with a snapshot each half second."""
+    """Return its log, with a snapshot each half second."""
     frames = simulate(scenario, snapshots=0.5).frames
     return b"".join(buslog.lines(frames, "lever")).decode().splitlines(keepends=True)
 

@@ -16,7 +16,7 @@ def seconds(recorded: np.ndarray, sender: np.ndarray, pieces: int = 1) -> tuple[
 
 
 def steady(count: int, first_us: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Recorded times with half a millisecond of jitter, and the sender's own."""
+    """Return recorded times with half a millisecond of jitter, and the sender's own."""
     sender = first_us + 1000 * np.arange(count, dtype=np.int64)
     jitter = np.random.default_rng(0).integers(-500, 500, count)
     return START + sender - first_us + jitter, sender

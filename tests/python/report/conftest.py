@@ -43,7 +43,7 @@ share = "1 %"
 
 
 def run(name: str, *overrides: str) -> Result:
-    """A scenario through the firmware in this process."""
+    """Return a scenario through the firmware in this process."""
     return simulate(scenario.load(name, overrides))
 
 

@@ -61,7 +61,7 @@ class Reader(HTMLParser):
             self.captions[-1] += data
 
     def ids(self, tag: str) -> list[str]:
-        """The ids of all elements of a kind, in order."""
+        """Return the ids of all elements of a kind, in order."""
         return [attributes["id"] or "" for name, attributes in self.tags if name == tag and "id" in attributes]
 
 
@@ -70,7 +70,7 @@ def read(path: Path) -> Reader:
 
 
 def figures(page: Reader) -> dict[str, dict[str, Any]]:
-    """The figures' specifications by id. Every curve has its axis; the first is plotly's own."""
+    """Return the figures' specifications by id. Every curve has its axis; the first is plotly's own."""
     found: dict[str, dict[str, Any]] = json.loads(gzip.decompress(base64.b64decode(page.scripts[0])))
     for key, figure in found.items():
         drawn = {f"yaxis{trace.get('yaxis', 'y')[1:]}" for trace in figure["data"]}
@@ -79,7 +79,7 @@ def figures(page: Reader) -> dict[str, dict[str, Any]]:
 
 
 def unpack(data: Any) -> NDArray[np.float64]:
-    """The values of a packed or plain column."""
+    """Return the values of a packed or plain column."""
     if isinstance(data, list):
         return np.array([np.nan if value is None else value for value in data], dtype=float)
     values = np.frombuffer(base64.b64decode(data["bdata"]), dtype={"f4": "<f4"}[data["dtype"]])
@@ -89,7 +89,7 @@ def unpack(data: Any) -> NDArray[np.float64]:
 
 
 def first_number(text: str) -> float:
-    """The first number in a cell."""
+    """Return the first number in a cell."""
     match = re.search(r"-?\d+(\.\d+)?", text.replace("\u2009", ""))
     assert match, f"no number in {text!r}"
     return float(match[0])

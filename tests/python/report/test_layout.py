@@ -114,7 +114,7 @@ def test_on_paper_charts_are_whole_and_light(browser: Browser, report: Path) -> 
 
 @pytest.fixture
 def wide(tmp_path: Path) -> Path:
-    """A page with a table of many columns, the last of them words, and a chart with a long title of its axis."""
+    """Return a page with a table of many columns, the last of them words, and a chart with a long title of its axis."""
     page = Page("wide", "", "a test")
     header = ["log", *(f"quantity_{index} [N m s/rad]" for index in range(14)), "problem"]
     page.section("numbers", "Numbers", "Numbers", table(header, [["1.234 ± 0.056"] * 15 + ["no sample in it " * 4]]))

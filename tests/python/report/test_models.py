@@ -28,7 +28,7 @@ def black_box(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Reader]
 
 @pytest.fixture(scope="module")
 def mismatch(tmp_path_factory: pytest.TempPathFactory) -> Reader:
-    """The lever as truth, a linear estimator."""
+    """Return the lever as truth, a linear estimator."""
     overrides = ("duration=6 s", "converged_after=1 s", "limits={}", "estimator.model=linear_black_box")
     return page_of(run("base_only", *overrides), tmp_path_factory.mktemp("mismatch"))
 

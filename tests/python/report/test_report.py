@@ -159,7 +159,7 @@ def traces(page: Reader, figure: str, name: str) -> list[dict[str, Any]]:
 
 
 def at(result: Result, x: np.ndarray, column: str) -> np.ndarray:
-    """A column at the samples nearest to the times x."""
+    """Return a column at the samples nearest to the times x."""
     return result.trace[column][np.searchsorted(result.trace["time_s"], x - 5e-4)]
 
 

@@ -25,7 +25,7 @@ def summary(
     unanswered: int = 0,
     modes_s: dict[str, float] | None = None,
 ) -> SimulationSummary:
-    """One of a made-up run with one quantity."""
+    """Return one of a made-up run with one quantity."""
     return SimulationSummary(
         scenario=Scenario("made", "made", "", seed, 1e-3, 0.0, [0.0], {"m_p": 0.05, "coverage": 0.6}),
         estimator=Estimator("lever", "trim", "dual", "annealing", "none", {}),

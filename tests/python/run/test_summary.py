@@ -49,7 +49,7 @@ def recording(load: Callable[..., Scenario]) -> loop.Recording:
 
 
 def perfect(recording: loop.Recording) -> Trace:
-    """A trace in which every estimate is the truth, with 1 % of sigma."""
+    """Return a trace in which every estimate is the truth, with 1 % of sigma."""
     random = np.random.default_rng(0)
     dynamics = {"natural_frequency": np.full(COUNT, 3.5), "damping_ratio": np.full(COUNT, 0.3)}
     values = {**recording.inputs.truth.parameters, **dynamics}

@@ -30,8 +30,8 @@ feedthrough_gain_sigma feedthrough_phase_sigma_rad mode faults lost corrupt late
 
 
 def answers(sample: int) -> list[tuple[str, dict[str, Any]]]:
-    """Parameters each 20th sample from 40 on, health each 100th, dither from 250 on, no answer at 333, one that may not
-    be used at 222, no innovation at 111."""
+    """Return parameters each 20th sample from 40 on, health each 100th, dither from 250 on, no answer at 333, one
+    that may not be used at 222, no innovation at 111."""
     if sample == 333:
         return []
     frames: list[tuple[str, dict[str, Any]]] = []

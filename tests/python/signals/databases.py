@@ -257,7 +257,7 @@ class Field:
 
 
 def database(truth: Aircraft, seed: int, flight: Flight) -> tuple[str, list[Field], dict[str, str]]:
-    """The text of a DBC, the values of its signals, and which are the inputs."""
+    """Return the text of a DBC, the values of its signals, and which are the inputs."""
     chance = random.Random(seed)
     noise = np.random.default_rng(seed)
     measured = {
@@ -287,7 +287,7 @@ def database(truth: Aircraft, seed: int, flight: Flight) -> tuple[str, list[Fiel
 
 
 def _per_si(unit: str) -> float:
-    """What values in SI are multiplied by to be in a unit of AIRCRAFT."""
+    """Return what values in SI are multiplied by to be in a unit of AIRCRAFT."""
     return _PER_SI.get(unit.lower().removesuffix("/s"), 1.0)
 
 

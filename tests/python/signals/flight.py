@@ -56,12 +56,12 @@ class Flight:
     z_ddot: FloatArray
 
     def every(self, step: int) -> Flight:
-        """A slower recording of the same."""
+        """Return a slower recording of the same."""
         return Flight(*(values[::step] for values in (self.time, self.theta, self.theta_dot, self.z_ddot)))
 
 
 def fly(duration: float = 20.0, rate: float = 500.0, seed: int = 1) -> Flight:
-    """Base noise of 1 to 10 Hz and 0.15 g, no motor torque, white sensor noise."""
+    """Simulate a flight: base noise of 1 to 10 Hz and 0.15 g, no motor torque, white sensor noise."""
     random = np.random.default_rng(seed)
     substeps = max(1, round(2000.0 / rate))
     count, step = round(duration * rate) * substeps, 1.0 / (rate * substeps)
@@ -94,7 +94,7 @@ def fly(duration: float = 20.0, rate: float = 500.0, seed: int = 1) -> Flight:
 
 
 def messages(flight: Flight, start: float = 1000.0) -> list[can.Message]:
-    """The frames of FOREIGN, with other traffic in between."""
+    """Return the frames of FOREIGN, with other traffic in between."""
     database = cantools.database.load_string(FOREIGN)
     assert isinstance(database, Database)
     frames: list[can.Message] = []
@@ -127,7 +127,7 @@ def write_log(path: Path, frames: list[can.Message]) -> Path:
 
 
 def as_decoded(flight: Flight) -> Flight:
-    """The values after their rounding in the frames of FOREIGN."""
+    """Return the values after their rounding in the frames of FOREIGN."""
     return Flight(
         flight.time,
         np.radians(0.005 * np.rint(np.degrees(flight.theta) / 0.005)),

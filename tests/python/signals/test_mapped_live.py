@@ -74,7 +74,7 @@ def fd_frames(flight: Flight) -> list[can.Message]:
 
 
 def shown(source: MappedBusSource, frames: list[can.Message], other_end: can.BusABC) -> Picture:
-    """What a view knows when all frames have come."""
+    """Return what a view knows when all frames have come."""
     picture = Picture()
     source.start()
     try:
@@ -177,7 +177,7 @@ class Page:
 
 @pytest.fixture
 def sender(frames: list[can.Message]) -> Iterator[None]:
-    """Sends the flight over and over."""
+    """Send the flight over and over."""
     ended = threading.Event()
 
     def send() -> None:

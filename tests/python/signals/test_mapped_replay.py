@@ -29,7 +29,7 @@ def frequency(summary: dict[str, Any]) -> float:
 
 
 def fed_directly(flight: Flight, period: float = 2e-3) -> float:
-    """The last frequency that the firmware finds in the same values, without any log."""
+    """Return the last frequency that the firmware finds in the same values, without any log."""
     samples = {"theta": flight.theta, "theta_dot": flight.theta_dot, "z_ddot": flight.z_ddot}
     time_us = np.rint(flight.time * 1e6).astype(np.int64)
     estimated = run_samples(Config(settings={"sample_period": period}), {"time_us": time_us, **samples})

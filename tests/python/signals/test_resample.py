@@ -13,7 +13,7 @@ FloatArray = NDArray[np.float64]
 
 
 def signal(time: FloatArray, name: str = "x") -> Signal:
-    """A sine of 3 Hz, measured at these times."""
+    """Return a sine of 3 Hz, measured at these times."""
     return Signal(name, time, wave(time))
 
 

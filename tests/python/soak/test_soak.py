@@ -49,7 +49,7 @@ def test_flights_differ_and_repeat() -> None:
 
 
 def judged(relative: float, sigma: float) -> soak.Sums:
-    """A flight in which each estimate is off by so much, and says that it is as uncertain as that; relative."""
+    """Return a flight in which each estimate is off by so much, and says that it is as uncertain as that; relative."""
     scenario, _ = flights.draw(1, 0)
     given = inputs.prepare(scenario)
     time, truth = given.time[::20], given.truth.at(slice(None, None, 20))

@@ -40,7 +40,7 @@ class Plan:
 
 
 def band_noise(rng: np.random.Generator, runs: int, count: int, rms: float, period: float) -> Array:
-    """Noise of 1 to 10 Hz, (runs, count)."""
+    """Return noise of 1 to 10 Hz, (runs, count)."""
     length = max(count, round(5.0 / period))
     spectrum = np.fft.rfft(rng.standard_normal((runs, length)))
     frequency = np.fft.rfftfreq(length, period)
@@ -51,7 +51,7 @@ def band_noise(rng: np.random.Generator, runs: int, count: int, rms: float, peri
 
 
 def simulate(plan: Plan) -> Batch:
-    """The truth moves as Batch.move says, w walks, theta_dot walks besides."""
+    """Return the truth moves as Batch.move says, w walks, theta_dot walks besides."""
     rng = np.random.default_rng(plan.seed)
     count = round(plan.duration / plan.period)
     shape = (plan.runs, count)

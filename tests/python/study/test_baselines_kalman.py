@@ -54,7 +54,7 @@ def driven(**changes: Any) -> Batch:
 
 
 def inputs(batch: Batch, run: int, k: int) -> Array:
-    """What multiplies p in the motion from sample k to k + 1."""
+    """Return what multiplies p in the motion from sample k to k + 1."""
     return np.array((*(0.5 * (batch.u[run, k] + batch.u[run, k + 1])), 1.0))
 
 

@@ -21,7 +21,7 @@ QUIET: dict[str, Any] = {"output_noise": (1e-9, 1e-9), "process_noise": 0.0, "wa
 
 
 def black_box(preload: str = "trim") -> Plan:
-    """Natural frequency 3.6 Hz, damping ratio 0.3."""
+    """Return natural frequency 3.6 Hz, damping ratio 0.3."""
     guess, sigma, walk = (-512.0, -13.6, 1.0), (150.0, 5.0, 0.3), (5.0, 0.2, 0.01)
     model = LinearBlackBox(0.1, preload)
     return Plan(model, 3, 4.0, guess=guess, sigma=sigma, walk=walk, positive=False, start=(0.1, 0.0))

@@ -38,7 +38,8 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The folder of a user, with an estimator that stays at the first guess, and one that breaks down half-way."""
+    """Yield the folder of a user, with an estimator that stays at the first guess, and one that breaks down
+    half-way."""
     (tmp_path / "own_estimators.py").write_text(
         "import numpy as np\n"
         "class Guess:\n"

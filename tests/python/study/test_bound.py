@@ -30,7 +30,7 @@ class Pushed:
     preload: str = "trim"
 
     def matrix(self, u: float | Array) -> Array:
-        """(5, 5, …) of [p; x] over a step, written out."""
+        """Return (5, 5, …) of [p; x] over a step, written out."""
         u = np.asarray(u)
         f = np.zeros((5, 5, *u.shape))
         f[range(5), range(5)] = 1.0
@@ -55,7 +55,7 @@ def process_covariance(known: Knowledge) -> Array:
 
 
 def scaled_matrix(known: Knowledge, u: float) -> Array:
-    """Of [w; x]: p = sigma w."""
+    """Return the scaled matrix of [w; x]: p = sigma w."""
     scale = np.diag((*known.sigma, 1.0, 1.0))
     f: Array = np.linalg.inv(scale) @ Pushed().matrix(u) @ scale
     return f
@@ -63,7 +63,7 @@ def scaled_matrix(known: Knowledge, u: float) -> Array:
 
 @functools.cache
 def linear_batch() -> Batch:
-    """Of truths drawn with matrices, here."""
+    """Return the linear batch of truths drawn with matrices, here."""
     rng = np.random.default_rng(17)
     sigma, walk, noise = np.array([0.1, 0.5, 0.8]), np.array([0.01, 0.02, 0.05]), np.array([0.02, 0.1])
     known = Knowledge(np.zeros(3), sigma, walk, False, noise, process_noise=0.05)
@@ -81,7 +81,7 @@ def linear_batch() -> Batch:
 
 
 def kalman(run: int) -> Array:
-    """Covariances (K, 5, 5) of FilterPy's Kalman filter on [w; x], started at the first sample."""
+    """Return covariances (K, 5, 5) of FilterPy's Kalman filter on [w; x], started at the first sample."""
     batch, known = linear_batch(), linear_batch().knowledge
     reference = KalmanFilter(dim_x=5, dim_z=2)
     reference.x = np.concatenate((np.zeros(3), batch.y[run, 0]))[:, None]

@@ -147,7 +147,7 @@ def test_moments_move_with_the_duration() -> None:
 
 
 def made_up(errors: NDArray[Any], time: NDArray[Any], stated: float = 1.0) -> Outcome:
-    """An outcome with these errors (B, T, 5) and stated variances."""
+    """Return an outcome with these errors (B, T, 5) and stated variances."""
     nees = np.sum(np.square(errors[..., :3]), axis=-1) / stated
     return Outcome(time, errors, errors, np.full_like(errors, stated), nees, None, 2e-3, 1000)
 
@@ -218,7 +218,8 @@ def test_errors_of_signed_parameters_are_relative_to_the_truth() -> None:
 
 
 def drawn(runs: int, seed: int, ratio: float) -> dict[str, NDArray[Any]]:
-    """Mean squares of two estimators whose errors are alike run by run, but for a factor and some of their own."""
+    """Return mean squares of two estimators whose errors are alike run by run, but for a factor and some of their
+    own."""
     rng = np.random.default_rng(seed)
     size = np.exp(0.3 * rng.standard_normal((runs, 1)))
     own = (1.0 + 0.05 * rng.standard_normal((runs, 5)) for _ in range(2))
@@ -271,7 +272,7 @@ def row(estimator: str, score: float, **more: Any) -> Row:
 
 
 def against(name: str, more: float, probability: float, case: str = CASE) -> comparison.Differences:
-    """A difference to the best."""
+    """Return a difference to the best."""
     return {(case, name): comparison.Difference(math.log(more), 0.02, 20, probability)}
 
 
@@ -363,7 +364,7 @@ def fives(first: float) -> tuple[float, ...]:
 
 
 def everything(factor: float = 1.0) -> list[Row]:
-    """Rows with a number of its own for each claim, which are `factor` times these."""
+    """Return rows with a number of its own for each claim, which are `factor` times these."""
     walk: dict[str, Any] = {"nees": 3.2 * factor, "nees_low": 2.5, "nees_high": 4.0, "ours": True}
     known: dict[str, Any] = {
         "settled_median": 0.9 * factor, "settled_worst": 1.9 * factor, "against": fives(1.3 * factor), "ours": True,
@@ -451,7 +452,7 @@ def test_a_claim_that_chance_may_miss_says_so(error: float, said: str) -> None:
 
 
 def points(data: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The traces of a chart but those that are there for the legend."""
+    """Return the traces of a chart but those that are there for the legend."""
     return [trace for trace in data if not np.isnan(unpack(trace["x"])).all()]
 
 

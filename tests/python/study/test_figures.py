@@ -289,7 +289,7 @@ def test_identification_shows_the_firmware_and_a_reference_that_starts_at_the_pr
 
 @functools.cache
 def grips() -> tuple[Batch, Batch, int]:
-    """Runs before and after the grip tightens, and the sample at which it does."""
+    """Run before and after the grip tightens, and the sample at which it does."""
     condition = Condition("lever", "trim", dither_rms=0.4, settings=PRIOR)
     calm = matched(condition, SHORT.runs, SHORT.duration, SEED)
     moment = calm.samples // 2

@@ -48,7 +48,7 @@ every = pytest.mark.parametrize("name", NAMES)
 
 @functools.cache
 def sheet(name: str, width: str = "single") -> Any:
-    """A figure in print, with a time axis as long as that of the real one."""
+    """Return a figure in print, with a time axis as long as that of the real one."""
     figure = figure_of(name)
     if figure.x_range[0] == 0.0:
         figure = dataclasses.replace(figure, x_range=(0.0, figure.x_range[1] * LONG.duration / SHORT.duration))
@@ -57,7 +57,7 @@ def sheet(name: str, width: str = "single") -> Any:
 
 @pytest.fixture(scope="module", autouse=True)
 def commands() -> Iterator[None]:
-    """Provides the entry points of pyproject.toml, installed or not, and figures of short runs."""
+    """Provide the entry points of pyproject.toml, installed or not, and figures of short runs."""
     groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
 
     def entry_points(group: str) -> list[importlib.metadata.EntryPoint]:
@@ -73,7 +73,7 @@ def commands() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def folder(commands: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What `lever figures` leaves behind."""
+    """Return what `lever figures` leaves behind."""
     out = tmp_path_factory.mktemp("figures") / "deep" / "folder"
     assert cli.main(["figures", "--seed", str(SEED), "--out", str(out)]) == 0
     return out

@@ -25,7 +25,7 @@ BORDER = Line((0, 1), np.array((-np.inf, 0.3)), np.array((-np.inf, 0.2)), np.arr
 
 
 def map_figure() -> MapFigure:
-    """Two estimators at four rates; the charts of each rate are brighter by one."""
+    """Return two estimators at four rates; the charts of each rate are brighter by one."""
     rows = tuple(tuple(Chart(VALUES + column, BORDER) for column in range(4)) for _ in range(2))
     return MapFigure(
         "map", "Map", "what it is", "error [%]", (0.0, 60.0), False, ("dual", "joint"), RATES, NOISE, NAMED, rows

@@ -53,7 +53,7 @@ def arrays(batch: Batch) -> dict[str, Array]:
 
 
 def same_variance(values: Array, sigma: float) -> bool:
-    """Whether the mean square of Gaussian values is sigma², at a probability of 0.1 % to be wrong."""
+    """Return whether the mean square of Gaussian values is sigma², at a probability of 0.1 % to be wrong."""
     low, high = chi2.ppf((5e-4, 1.0 - 5e-4), values.size)
     return bool(low < np.sum(np.square(values)) / sigma**2 < high)
 

@@ -39,7 +39,8 @@ class Regression:
 
 
 def batch(model: Regression, walk: float = 0.0) -> Batch:
-    """One run: white inputs, theta_dot with noise, theta zero; a first guess of 0 with a standard deviation of 2."""
+    """Return one run: white inputs, theta_dot with noise, theta zero; a first guess of 0 with a standard deviation
+    of 2."""
     rng = np.random.default_rng(1)
     u = rng.standard_normal((1, SAMPLES, 2))
     mean = 0.5 * (u[0, 1:] + u[0, :-1])
@@ -67,7 +68,7 @@ def least_squares(data: Batch, walk: float = 0.0) -> tuple[Array, Array]:
 
 
 def filtered(data: Batch) -> tuple[Array, Array]:
-    """What Algorithm 1 makes of the run: w in physical units (K, 3), its covariance (K, 3, 3)."""
+    """Return what Algorithm 1 makes of the run: w in physical units (K, 3), its covariance (K, 3, 3)."""
     recursion = ParameterFilter(data, steps=1)
     p, covariance = np.zeros((SAMPLES, 3)), np.tile(4.0 * np.eye(3), (SAMPLES, 1, 1))
     for k in range(1, SAMPLES):

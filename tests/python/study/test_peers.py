@@ -77,7 +77,7 @@ def test_logs_say_what_the_sensors_said() -> None:
 
 
 def measured(log: logs.Log, name: str) -> tuple[float, float]:
-    """Median rms error of the natural frequency [%], and coverage [%]."""
+    """Return median rms error of the natural frequency [%], and coverage [%]."""
     (track,) = filters.tracks([log], filters.PEERS[name])
     outcome = Outcome(log.recording, track, log.condition.window)
     return tuple(float(np.median(FIGURES[f"f_n {what}"].compute(outcome))) for what in ("rms", "covered"))  # type: ignore[return-value]
@@ -141,7 +141,7 @@ def test_progress_counts_conditions(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def results(case: str, runs: int, **rms: float) -> list[Result]:
-    """Errors about these, alike in all runs but for 10 %."""
+    """Return errors about these, alike in all runs but for 10 %."""
     size = 1.0 + 0.1 * np.random.default_rng(1).standard_normal(runs)
     scatter = 1.0 + 0.01 * np.random.default_rng(2).standard_normal((len(rms), runs))
     return [

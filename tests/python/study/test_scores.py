@@ -16,7 +16,7 @@ Array = NDArray[Any]  # of floats
 
 
 def correlated(rng: np.random.Generator, runs: int, times: int, memory: float) -> Array:
-    """(runs, times) standard normal values, each correlated by `memory` with the one before."""
+    """Return (runs, times) standard normal values, each correlated by `memory` with the one before."""
     white = rng.standard_normal((runs, times))
     for k in range(1, times):
         white[:, k] = memory * white[:, k - 1] + np.sqrt(1.0 - memory**2) * white[:, k]

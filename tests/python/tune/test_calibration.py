@@ -23,7 +23,7 @@ TRUTH = (1.025, 2.2e-3, 0.12)
 
 @pytest.fixture(scope="module")
 def wrong(simulate: Simulate) -> Recording:
-    """A minute with the calibration TRUTH."""
+    """Return a minute with the calibration TRUTH."""
     gain, delay, friction = TRUTH
     return recording.read([simulate(60.0, gain_error=gain - 1.0, delay=delay, friction=friction)])
 

@@ -25,7 +25,7 @@ QUICK = (*FEW, "robbins_monro_time")
 
 @pytest.fixture(scope="module")
 def tuned(steady_log: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with what a whole run of the command writes."""
+    """Return a folder with what a whole run of the command writes."""
     out = tmp_path_factory.mktemp("tuned")
     files = ["-o", str(out / "my.settings"), "--page", str(out / "tune.html"), "--json", str(out / "tune.json")]
     assert cli.main(["tune", str(steady_log), *files]) == 0
@@ -213,6 +213,6 @@ def test_worse_on_the_part_held_out_writes_nothing(simulate: Simulate, tmp_path:
 
 
 def _shifted(line: str, seconds: float) -> str:
-    """A line of candump's, recorded later."""
+    """Return a line of candump's, recorded later."""
     time, _, rest = line.removeprefix("(").partition(")")
     return f"({float(time) + seconds:.6f}){rest}"

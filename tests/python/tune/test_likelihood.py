@@ -18,7 +18,8 @@ SIGMA = 0.04  # relative standard deviation of unknown parameters
 
 
 def config(sigma: float, **settings: float) -> Config:
-    """Of the linear model with constant parameters near GUESS, which starts at the first sample, adapting nothing."""
+    """Return the config of the linear model with constant parameters near GUESS, which starts at the first sample,
+    adapting nothing."""
     values: dict[str, float] = dict.fromkeys(("align_time", "caution_time", "change_threshold", "noise_window"), 0.0)
     values |= {"lever_preload_angle": 0.0, "excitation_least": 0.0, "theta_dot_process_noise": textbook.Q_RATE}
     values |= {"theta_noise": textbook.R[0], "theta_dot_noise": textbook.R[1]}

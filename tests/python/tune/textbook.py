@@ -27,7 +27,7 @@ def system(p: Array) -> tuple[Array, Array]:
 
 
 def simulate(p: Array, count: int, seed: int) -> NDArray[np.void]:
-    """Samples (SAMPLE) of a system with parameters p, shaken and pushed at random."""
+    """Return samples (SAMPLE) of a system with parameters p, shaken and pushed at random."""
     rng = np.random.default_rng(seed)
     a, b = system(p)
     inputs = np.cumsum(rng.standard_normal((count, 2)), axis=0) * INPUT_CHANGE

@@ -84,11 +84,11 @@ class Browser:
         self.complaints.clear()
 
     def prepare(self, script: str) -> None:
-        """Runs a script in each page that is opened, before its own."""
+        """Run a script in each page that is opened, before its own."""
         self._scripts.append(self.ask("Page.addScriptToEvaluateOnNewDocument", source=script)["identifier"])
 
     def ask(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """A command of the protocol; returns its result."""
+        """Return a command of the protocol; return its result."""
         return self._loop.run_until_complete(self._ask(method, parameters))
 
     async def _ask(self, method: str, parameters: dict[str, Any]) -> dict[str, Any]:
@@ -114,18 +114,18 @@ class Browser:
             self.complaints.append(params["entry"]["text"])
 
     def open(self, url: str) -> None:
-        """Opens a page and waits until it is there with all that belongs to it."""
+        """Open a page and wait until it is there with all that belongs to it."""
         assert "errorText" not in self.ask("Page.navigate", url=url)
         self.wait(f"location.href == {json.dumps(url)} && document.readyState == 'complete'")
 
     def run(self, script: str) -> Any:
-        """The value of a JavaScript expression in the page."""
+        """Return the value of a JavaScript expression in the page."""
         result = self.ask("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in result, result["exceptionDetails"]
         return result["result"].get("value")
 
     def wait(self, script: str) -> Any:
-        """Waits until a JavaScript expression is true; returns its value."""
+        """Wait until a JavaScript expression is true; return its value."""
         return _wait(lambda: self.run(script), script)
 
     def click(self, selector: str) -> None:

@@ -29,7 +29,7 @@ class Flight:
         self._commander = Commander()
 
     def messages(self, count: int) -> list[can.Message]:
-        """All that passes on the bus during `count` more samples."""
+        """Return all that passes on the bus during `count` more samples."""
         for sample in swing(self.sample, count):
             for frame in sample:
                 self.send(*frame)
@@ -40,7 +40,7 @@ class Flight:
         return [as_frame(message) for message in self.messages(count)]
 
     def command(self, values: Mapping[str, codec.Value]) -> None:
-        """A COMMAND, of this one's only sender."""
+        """Send a COMMAND as the only sender."""
         self._commander.send(values, self.send)
 
     def send(self, identifier: int, data: bytes) -> None:
@@ -69,7 +69,7 @@ def flight(make_flight: Callable[..., Flight]) -> Flight:
 
 @pytest.fixture
 def log(flight: Flight, tmp_path: Path) -> Path:
-    """A recording of 600 ms."""
+    """Return a recording of 600 ms."""
     path = tmp_path / "flight.log"
     with can.CanutilsLogWriter(path, channel="can0") as writer:
         for message in flight.messages(600):
@@ -80,7 +80,7 @@ def log(flight: Flight, tmp_path: Path) -> Path:
 
 @pytest.fixture
 def start_lever() -> Iterator[Callable[..., subprocess.Popen[str]]]:
-    """Starts the command `lever`, which is ended after the test if it has not ended by itself."""
+    """Start the command `lever`, which is ended after the test if it has not ended by itself."""
     started: list[subprocess.Popen[str]] = []
 
     def start(*arguments: str) -> subprocess.Popen[str]:

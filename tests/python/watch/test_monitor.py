@@ -46,13 +46,13 @@ class Fed(Source):
 
 
 def screen(app: Monitor) -> list[str]:
-    """What the terminal shows, by lines."""
+    """Return what the terminal shows, by lines."""
     lines = app.screen._compositor.render_strips()
     return ["".join(segment.text for segment in Segment.strip_styles(strip)) for strip in lines]
 
 
 async def shown(app: Monitor, pilot: Pilot[None], pattern: str) -> str:
-    """What the terminal shows, once that is in it; a loaded machine draws late."""
+    """Return what the terminal shows, once that is in it; a loaded machine draws late."""
     end = time.monotonic() + PATIENCE
     while not re.search(pattern, text := "\n".join(screen(app))):
         assert time.monotonic() < end, text

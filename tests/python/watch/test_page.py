@@ -25,7 +25,7 @@ CONDITION = "document.getElementById('condition').textContent"
 
 
 def address(process: subprocess.Popen[str]) -> str:
-    """Of the page, which the command prints first."""
+    """Return the address of the page, which the command prints first."""
     assert process.stdout is not None
     line = process.stdout.readline()
     match = re.search(r"http://\S+/", line)
@@ -47,7 +47,7 @@ def estimates(browser: Browser) -> dict[str, list[str]]:
 
 
 def drawn(browser: Browser, canvas: str) -> int:
-    """How many colours a canvas shows."""
+    """Return how many colours a canvas shows."""
     script = """(() => {
       const canvas = document.querySelector(%s), pen = canvas.getContext('2d');
       const data = new Uint32Array(pen.getImageData(0, 0, canvas.width, canvas.height).data.buffer);

@@ -29,7 +29,7 @@ class Quiet(Source):
 
 
 def rows(table: Table) -> dict[str, tuple[list[str], set[str]]]:
-    """The words of each row and the colours in it, by its first cell."""
+    """Return the words of each row and the colours in it, by its first cell."""
     found = {}
     for index, line in enumerate(zip(*(column.cells for column in table.columns), strict=True)):
         cells = [cell if isinstance(cell, Text) else Text(str(cell)) for cell in line]

@@ -20,7 +20,7 @@ from python.watch.conftest import Flight
 
 
 def watch(picture: Picture, flight: Flight, seconds: float) -> None:
-    """Takes what passes in `seconds` of flight, a tenth of a second at a time."""
+    """Take what passes in `seconds` of flight, a tenth of a second at a time."""
     for _ in range(round(10 * seconds)):
         frames = flight.frames(100)
         picture.take(frames, flight.sample * 1e-3)

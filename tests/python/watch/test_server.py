@@ -66,7 +66,7 @@ Story = Callable[[Server], Awaitable[None]]
 
 @pytest.fixture
 def on_server(flight: Flight) -> Callable[..., FlightSource]:
-    """Runs a story against a server in this process; returns its source."""
+    """Run a story against a server in this process; return its source."""
 
     def run(story: Story, *, host: str = "127.0.0.1", read_only: bool = False) -> FlightSource:
         source = FlightSource(flight)
@@ -88,7 +88,7 @@ def on_server(flight: Flight) -> Callable[..., FlightSource]:
 
 
 async def fetch(server: Server, path: str = "", method: str = "GET", **headers: str) -> HTTPResponse:
-    """The answer, whatever its status."""
+    """Return the answer, whatever its status."""
     body = "freeze" if method == "POST" else None
     request = HTTPRequest(f"{server.address}{path}", method, headers, body, allow_nonstandard_methods=True)
     response: HTTPResponse = await AsyncHTTPClient().fetch(request, raise_error=False)
@@ -107,7 +107,7 @@ async def status_of_socket(server: Server, **headers: str) -> int:
 
 
 async def closed(connection: WebSocketClientConnection, is_open: bool = True) -> None:
-    """Closes it, and waits until it is: what the loop would leave open is reported against another test."""
+    """Close it, and wait until it is closed: what the loop would leave open is reported against another test."""
     connection.close()
     while is_open:
         is_open = await connection.read_message() is not None
@@ -131,7 +131,7 @@ class Visitor:
         await self._connection.write_message(message)
 
     async def hear(self, kind: str) -> Any:
-        """The content of the next message of a kind."""
+        """Return the content of the next message of a kind."""
         while True:
             text = await self._connection.read_message()
             self._open = text is not None

@@ -25,7 +25,7 @@ from python.watch.conftest import Flight
 
 
 def wait_for(source: Source, count: int) -> list[Frame]:
-    """The frames of a source until there are `count`."""
+    """Return the frames of a source until there are `count`."""
     frames: list[Frame] = []
     deadline = time.monotonic() + PATIENCE
     while len(frames) < count:
@@ -37,7 +37,7 @@ def wait_for(source: Source, count: int) -> list[Frame]:
 
 @pytest.fixture
 def other_end() -> Iterator[can.BusABC]:
-    """Another one on the virtual bus `watched`."""
+    """Yield another one on the virtual bus `watched`."""
     with can.Bus(interface="virtual", channel="watched") as bus:
         yield bus
 
@@ -143,7 +143,7 @@ class Commanding(Source):
 
 @pytest.fixture
 def pass_time(monkeypatch: pytest.MonkeyPatch) -> Callable[[float], None]:
-    """Lets time pass for sources [s]."""
+    """Let time pass for sources [s]."""
     now = [1000.0]
     monkeypatch.setattr(sources, "time", SimpleNamespace(monotonic=lambda: now[0]))
 

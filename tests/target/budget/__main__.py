@@ -76,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main() -> int:
-    """The command line."""
+    """Return the command line."""
     args = _parser().parse_args()
     try:
         return int(args.run(args))

@@ -73,13 +73,13 @@ class Instruction:
 
 
 def _words(transfer: Instruction) -> int:
-    """Registers in its list, a double one for two; ldrd and strd have no list, but two registers."""
+    """Register in its list, a double one for two; ldrd and strd have no list, but two registers."""
     registers = transfer.operands.partition("{")[2]
     return _bits(registers).bit_count() or registers.count(",") + 1 if registers else 2
 
 
 def _bits(operands: str) -> int:
-    """The float registers named in it: bit n is s<n>; d<n> is a pair of them."""
+    """Return the float registers named in it: bit n is s<n>; d<n> is a pair of them."""
     bits = 0
     for kind, first, last in _REGISTER.findall(operands):
         width = 2 if kind == "d" else 1
@@ -89,8 +89,8 @@ def _bits(operands: str) -> int:
 
 
 def of_block(block: Sequence[Instruction], after: Instruction, is_jump: bool) -> list[int]:
-    """Of each instruction in a block of straight code, which goes on, or jumps, to the instruction `after`: a wait
-    counts where the result comes from, a jump at the branch."""
+    """Return the of block of each instruction in a block of straight code, which goes on, or jumps, to the
+    instruction `after`: a wait counts where the result comes from, a jump at the branch."""
     spent = [each.cycles for each in block]
     for place, (each, following) in enumerate(zip(block, [*block[1:], after], strict=True)):
         spent[place] += _USED_AT_ONCE if each.result & following.sources else 0

@@ -46,7 +46,7 @@ _BYTES = (
 
 
 def numbers(budget: dict[str, Any]) -> dict[str, float]:
-    """What is compared, by the path in budget.json: "instructions.dual.lever.mean"."""
+    """Return what is compared, by the path in budget.json: "instructions.dual.lever.mean"."""
     found: dict[str, float] = {}
 
     def walk(entry: dict[str, Any], path: str) -> None:
@@ -63,7 +63,7 @@ def numbers(budget: dict[str, Any]) -> dict[str, float]:
 
 
 def beyond_limits(budget: dict[str, Any]) -> list[str]:
-    """A line for each limit that does not hold."""
+    """Return a line for each limit that does not hold."""
     found = numbers(budget)
     lines = [
         f"{name} is {found[name]:g}: at most {limit} is allowed"
@@ -80,24 +80,25 @@ def beyond_limits(budget: dict[str, Any]) -> list[str]:
 
 
 def load() -> dict[str, Any]:
-    """The accepted values: {"compiler": …, "values": {path: number}}."""
+    """Return the accepted values: {"compiler": …, "values": {path: number}}."""
     content: dict[str, Any] = json.loads(GOLDEN.read_text(encoding="utf-8"))
     return content
 
 
 def accept(budget: dict[str, Any]) -> None:
-    """Makes this budget the golden one."""
+    """Make this budget the golden one."""
     content = {"compiler": budget["compiler"], "values": numbers(budget)}
     write_text(GOLDEN, json.dumps(content, indent=4) + "\n")
 
 
 def is_comparable(budget: dict[str, Any], golden: dict[str, Any]) -> bool:
-    """Whether both are of the same compiler; another one's code is neither a regression nor an improvement."""
+    """Return whether both are of the same compiler; another one's code is neither a regression nor an improvement."""
     return bool(budget["compiler"] == golden["compiler"])
 
 
 def regressions(budget: dict[str, Any], golden: dict[str, Any]) -> list[str]:
-    """A line for each value that is more than TOLERANCE above the golden one, or that only one of the two has."""
+    """Return a line for each value that is more than TOLERANCE above the golden one, or that only one of the two
+    has."""
     new, old = numbers(budget), golden["values"]
     lines = [
         f"{name}: {old[name]:g} before, {new[name]:g} now ({_percent(old[name], new[name])}); {ACCEPT} accepts it"
@@ -109,7 +110,7 @@ def regressions(budget: dict[str, Any], golden: dict[str, Any]) -> list[str]:
 
 
 def improvements(budget: dict[str, Any], golden: dict[str, Any]) -> list[str]:
-    """A line for each value that is so much below the golden one that this should be made to stay."""
+    """Return a line for each value that is so much below the golden one that this should be made to stay."""
     new, old = numbers(budget), golden["values"]
     return sorted(
         f"{name}: {old[name]:g} before, {new[name]:g} now ({_percent(old[name], new[name])}); {ACCEPT} keeps it"

@@ -20,12 +20,12 @@ Values = dict[str, float]
 
 
 def section(name: str) -> str:
-    """What stands in the guide between <!-- name: … --> and <!-- /name -->."""
+    """Return what stands in the guide between <!-- name: … --> and <!-- /name -->."""
     return _find(GUIDE.read_text(encoding="utf-8"), name)[2].strip() + "\n"
 
 
 def update(sections: dict[str, str]) -> None:
-    """Writes sections into the guide."""
+    """Write sections into the guide."""
     text = GUIDE.read_text(encoding="utf-8")
     for name, content in sections.items():
         begin, end = _find(text, name).span(2)
@@ -40,7 +40,7 @@ def _find(text: str, name: str) -> re.Match[str]:
 
 
 def instructions(values: Values) -> str:
-    """The table of instructions a sample."""
+    """Return the table of instructions a sample."""
     lines = ["| | mean | worst, running | worst, first 2 s | cycles, mean |", "|---|---|---|---|---|"]
     pairs = [(estimator, model) for estimator in ESTIMATORS for model in MODELS]
     cases = {f"`lever_update()`, {estimator}, `{model}`": f"{estimator}.{model}" for estimator, model in pairs}
@@ -63,7 +63,7 @@ def _counts(what: str, case: str, values: Values) -> str:
 
 
 def memory(values: Values) -> str:
-    """The table of flash, RAM and stack."""
+    """Return the table of flash, RAM and stack."""
     room, used = values["memory_bytes"], values["instance_bytes"]
     rows = {
         "flash: code of the core, all of it": values["text_bytes"],
@@ -81,7 +81,7 @@ def memory(values: Values) -> str:
 
 
 def port(sizes: dict[str, dict[str, Size]]) -> str:
-    """The table of the callbacks, from of_port() of each transport."""
+    """Return the table of the callbacks, from of_port() of each transport."""
     lines = ["| | on bxCAN | as SLCAN over a USART |", "|---|---|---|"]
     for name in (*FUNCTIONS, "all"):
         cells = (f"{size.bytes:,} bytes, {size.lines} lines" for size in (sizes[each][name] for each in TRANSPORTS))
@@ -91,5 +91,5 @@ def port(sizes: dict[str, dict[str, Size]]) -> str:
 
 
 def port_image(images: Path, transport: str) -> Path:
-    """The image of a transport in the folder where they were built."""
+    """Return the image of a transport in the folder where they were built."""
     return images / f"lever_stm32f4_{transport}.elf"

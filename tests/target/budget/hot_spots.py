@@ -20,7 +20,7 @@ from .trace import Trace, disassemble, functions, trace
 
 
 def run(args: argparse.Namespace) -> int:
-    """The command. Raises LeverError."""
+    """Return the command. Raise LeverError."""
     recording = record(args.model)
     first, last = _window(args.window, len(recording.samples))
     elf = image.build(args.build, args.firmware, args.flags)
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _window(text: str, count: int) -> tuple[int, int]:
-    """First and last sample of "FROM:TO" in seconds, at 1 kHz. Raises LeverError."""
+    """Return first and last sample of "FROM:TO" in seconds, at 1 kHz. Raises LeverError."""
     try:
         first, end = (round(1000.0 * float(time)) for time in text.split(":"))
     except ValueError:
@@ -50,7 +50,7 @@ def _window(text: str, count: int) -> tuple[int, int]:
 
 
 def _choose(traced: Trace, worst: bool) -> list[int]:
-    """Indices of the samples that are looked at."""
+    """Return indices of the samples that are looked at."""
     return [int(np.argmax(traced.instructions))] if worst else list(range(len(traced.instructions)))
 
 
@@ -68,7 +68,7 @@ class Frame:
 
 
 def _frames(elf: Path, addresses: list[int]) -> dict[int, list[Frame]]:
-    """The frames of each address, innermost first; more than one where functions were inlined."""
+    """Return the frames of each address, innermost first; more than one where functions were inlined."""
     command = [image.tool("addr2line"), "--inlines", "--functions", "--addresses", f"--exe={elf}"]
     asked = "\n".join(map(hex, addresses))
     output = subprocess.run(command, input=asked, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
@@ -118,7 +118,7 @@ def _source(file: str, line: int) -> str:
 
 
 def _place(file: str) -> str:
-    """The last two parts of a path: filter/cdkf.c."""
+    """Return the last two parts of a path: filter/cdkf.c."""
     return "/".join(file.split("/")[-2:])
 
 

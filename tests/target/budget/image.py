@@ -69,7 +69,7 @@ class Run:
 
 
 def run_command(command: list[str], what: str, hint: str = "") -> str:
-    """The output of a finished command. Raises LeverError with the last lines of a failed one."""
+    """Return the output of a finished command. Raise LeverError with the last lines of a failed one."""
     try:
         result = subprocess.run(
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False, timeout=_TIME_LIMIT_S
@@ -85,35 +85,35 @@ def run_command(command: list[str], what: str, hint: str = "") -> str:
 
 
 def tool(name: str) -> str:
-    """A program of the cross toolchain."""
+    """Return a program of the cross toolchain."""
     return f"arm-none-eabi-{name}"
 
 
 def run_tool(name: str, *arguments: str | Path) -> str:
-    """The output of a program of the cross toolchain. Raises LeverError."""
+    """Return the output of a program of the cross toolchain. Raise LeverError."""
     return run_command([tool(name), *(str(argument) for argument in arguments)], name, _TOOLCHAIN_PACKAGES)
 
 
 def call_graph(elf: Path) -> Path:
-    """What the compiler says of the functions of the core as they are linked into the image."""
+    """Return what the compiler says of the functions of the core as they are linked into the image."""
     return elf.with_name(f"{elf.name}.ltrans0.ltrans.ci")
 
 
 def core_objects(elf: Path) -> dict[str, Path]:
-    """The object files of the core, by source file ("filter/cdkf.c")."""
+    """Return the object files of the core, by source file ("filter/cdkf.c")."""
     folder = elf.parent / "lever_cdkf/CMakeFiles/lever_cdkf.dir"
     paths = sorted(folder.glob("*/*.c.obj"))
     return {str(path.relative_to(folder)).removesuffix(".obj"): path for path in paths}
 
 
 def compiler() -> str:
-    """Name and version of the cross compiler. Raises LeverError when there is none."""
+    """Return name and version of the cross compiler. Raise LeverError when there is none."""
     return run_tool("gcc", "--version").splitlines()[0]
 
 
 def build(folder: Path, firmware: Path = FIRMWARE, flags: str = SHIPPED, processor: str | None = None) -> Path:
-    """Builds the image of a firmware folder in `folder`, and returns its .elf. `flags` are those of the optimiser,
-    `processor` those that choose another processor than the M4F. Raises LeverError."""
+    """Build the image of a firmware folder in `folder`, and return its .elf. `flags` are those of the optimiser,
+    `processor` those that choose another processor than the M4F. Raise LeverError."""
     compiler()
     if not (firmware / "lever_cdkf.h").is_file():
         raise LeverError(f"{firmware}: no lever_cdkf.h there: give the firmware folder of a source tree")
@@ -144,12 +144,12 @@ def cases() -> list[tuple[str, str, str]]:
 
 
 def mitigation(form: str) -> str:
-    """What a form measures."""
+    """Return what a form measures."""
     return "cancellation_and_damping" if form == "bounce" else "none"
 
 
 def arguments(recording: Recording, model: str, estimator: str, form: str) -> list[str]:
-    """The configuration as main.c reads it: what differs from the defaults."""
+    """Return the configuration as main.c reads it: what differs from the defaults."""
     config, default = recording.scenario.config, Config()
     numbers = {name: value for name, value in config.settings.items() if value != default.settings[name]}
     numbers["dither_rms"] = recording.dither_rms
@@ -160,7 +160,7 @@ def arguments(recording: Recording, model: str, estimator: str, form: str) -> li
 
 
 def run(elf: Path, recording: Recording, model: str, estimator: str, form: str) -> Run:
-    """Runs the image over the recording in one of FORMS. Raises LeverError."""
+    """Run the image over the recording in one of FORMS. Raise LeverError."""
     with tempfile.TemporaryDirectory(prefix="lever-budget-") as name:
         samples, output = Path(name) / "samples", Path(name) / "output"
         samples.write_bytes(recording.blob(form))
@@ -174,7 +174,7 @@ def run(elf: Path, recording: Recording, model: str, estimator: str, form: str) 
 
 
 def _read(data: bytes, count: int) -> Run:
-    """What the image wrote. Raises LeverError when its own loop was not timed right, or something is missing."""
+    """Return what the image wrote. Raise LeverError when its own loop was not timed right, or something is missing."""
     empty, calibration, rounds, *stacks, init, said_bytes = _INTRO.unpack_from(data)
     looped = (calibration - empty) / TICKS_AN_INSTRUCTION
     if abs(looped - 2 * rounds) > 1.0:

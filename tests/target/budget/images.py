@@ -10,7 +10,7 @@ from . import image
 
 
 def run(args: argparse.Namespace) -> int:
-    """The command; without the cross compiler it does nothing, and the tests are skipped. Raises LeverError."""
+    """Return the command; without the cross compiler it does nothing, and the tests are skipped. Raise LeverError."""
     if shutil.which(image.tool("gcc")) is None:
         print(f"no {image.tool('gcc')}: tests of the budget are skipped")
         return 0
@@ -22,7 +22,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _dearer_firmware(folder: Path) -> Path:
-    """A copy of the firmware in which each step fills a buffer of 1600 bytes."""
+    """Return a copy of the firmware in which each step fills a buffer of 1600 bytes."""
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(image.FIRMWARE, folder)
     source = folder / "app/estimator.c"

@@ -65,23 +65,23 @@ class Count:
 
 
 def is_steady(run: Run, time: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether each sample, at its time [s], is one of steady running."""
+    """Return whether each sample, at its time [s], is one of steady running."""
     steady: NDArray[np.bool_] = (run.mode == _RUNNING) & (time >= START_UP_S)
     return steady
 
 
 def sample_times(recording: Recording) -> NDArray[np.float64]:
-    """Of a recording [s]."""
+    """Return the sample times of a recording [s]."""
     return recording.samples["time_us"].astype(np.float64) * 1e-6
 
 
 def facade(firmware: Path) -> list[str]:
-    """The functions of lever_cdkf.h."""
+    """Return the functions of lever_cdkf.h."""
     return _FACADE.findall((firmware / "lever_cdkf.h").read_text(encoding="utf-8"))
 
 
 def run_all(elf: Path, tell: Tell = _silent) -> dict[Case, Run]:
-    """The image in QEMU, over every case. Raises LeverError."""
+    """Return the image in QEMU, over every case. Raise LeverError."""
     cases, runs = image.cases(), {}
     for done, (estimator, model, form) in enumerate(cases):
         tell(done, len(cases), f"{estimator} {model} {form} in QEMU")
@@ -90,7 +90,7 @@ def run_all(elf: Path, tell: Tell = _silent) -> dict[Case, Run]:
 
 
 def budget(elf: Path, firmware: Path, runs: dict[Case, Run], tell: Tell = _silent) -> dict[str, Any]:
-    """What budget.json holds, of the runs of an image of this firmware. Raises LeverError."""
+    """Return what budget.json holds, of the runs of an image of this firmware. Raise LeverError."""
     return {
         "processor": "Cortex-M4F, as QEMU's netduinoplus2 has it",
         "compiler": image.compiler(),
@@ -123,7 +123,7 @@ def _spent(elf: Path, runs: dict[Case, Run], tell: Tell) -> dict[str, Any]:
 
 
 def after_gap(elf: Path, model: str, estimator: str) -> tuple[int, int]:
-    """Instructions and cycles of the dearest call there is: the first sample after a gap. Raises LeverError."""
+    """Instructions and cycles of the dearest call there is: the first sample after a gap. Raise LeverError."""
     cut, first = record(model).without(GAP_S), round(GAP_S[0] * 1e3)
     run = image.run(elf, cut, model, estimator, "update")
     traced = trace.trace(elf, cut, model, estimator, "update", first, first)
@@ -131,13 +131,13 @@ def after_gap(elf: Path, model: str, estimator: str) -> tuple[int, int]:
 
 
 def _init(elf: Path, runs: dict[Case, Run]) -> dict[str, int]:
-    """Of lever_init(), which is called once."""
+    """Return the init of lever_init(), which is called once."""
     traced = trace.trace(elf, record("lever"), "lever", "dual", "update", trace.INIT, trace.INIT)
     return {"instructions": runs["dual", "lever", "update"].init, "cycles": int(traced.cycles[0])}
 
 
 def _operations(traced: trace.Trace, steady: NDArray[np.bool_]) -> dict[str, float]:
-    """The floor under the instructions of lever_update(), and how far that is away."""
+    """Return the floor under the instructions of lever_update(), and how far that is away."""
     operations, mean = traced.operations[steady], float(traced.operations[steady].mean())
     return {
         "mean": round(mean, 1),
@@ -147,7 +147,7 @@ def _operations(traced: trace.Trace, steady: NDArray[np.bool_]) -> dict[str, flo
 
 
 def _calibration(runs: dict[Case, Run]) -> dict[str, float]:
-    """Of all runs the one that is off most; image.run() has refused what is not right."""
+    """Return the calibration of all runs the one that is off most; image.run() has refused what is not right."""
     worst = max(runs.values(), key=lambda run: abs(run.loop_measured - run.loop_instructions))
     return {
         "loop_instructions": worst.loop_instructions,
@@ -171,7 +171,7 @@ def _bytes(elf: Path) -> dict[str, Any]:
 
 
 def _stack(elf: Path, firmware: Path, runs: dict[Case, Run]) -> dict[str, Any]:
-    """The worst case by the call graph, and what was seen to be written in all runs."""
+    """Return the worst case by the call graph, and what was seen to be written in all runs."""
     chains = stack.worst_case(elf, facade(firmware))
     painted = {"lever_update": 0, "tick": 0, **dict.fromkeys(image.CALLED_ONCE, 0)}
     for (_, _, form), run in runs.items():

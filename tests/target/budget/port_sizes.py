@@ -37,7 +37,8 @@ class Size:
 
 
 def of_port(transport: str, elf: Path) -> dict[str, Size]:
-    """Each of FUNCTIONS with all of the port that it calls, and "all" of the port in an image. Raises LeverError.
+    """Return each of FUNCTIONS with all of the port that it calls, and "all" of the port in an image. Raises
+    LeverError.
 
     Bytes are those of the functions in the image, lines those of the functions in the source: what was inlined counts
     where it is."""
@@ -65,7 +66,7 @@ def _reached(name: str, calls: dict[str, set[str]]) -> set[str]:
 
 
 def _bodies(transport: str) -> dict[str, str]:
-    """The body of every function in the sources of the port, without comments."""
+    """Return the body of every function in the sources of the port, without comments."""
     found: dict[str, str] = {}
     for folder in _FOLDERS:
         for file in sorted((_PORT / folder).glob("*.[ch]")):

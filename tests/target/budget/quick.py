@@ -11,7 +11,7 @@ from .recording import record
 
 
 def run(args: argparse.Namespace) -> int:
-    """The command. Raises LeverError."""
+    """Return the command. Raise LeverError."""
     elf = image.build(args.build, args.firmware, args.flags)
     recording = record(args.model)
     time = measure.sample_times(recording)

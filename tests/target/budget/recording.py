@@ -41,12 +41,12 @@ class Recording:
     """[N m]"""
 
     def blob(self, form: str) -> bytes:
-        """What the image expects in flash, for one of FORMS."""
+        """Return what the image expects in flash, for one of FORMS."""
         records = self.frames if form == "tick" else self.samples
         return struct.pack("<II", len(self.samples), records.dtype.itemsize) + records.tobytes()
 
     def without(self, gap_s: tuple[float, float]) -> Recording:
-        """The same, but for the samples from the first time [s] up to the second."""
+        """Return the same, but for the samples from the first time [s] up to the second."""
         time = self.samples["time_us"] * 1e-6
         kept = (time < gap_s[0]) | (time >= gap_s[1])
         return replace(self, samples=self.samples[kept], frames=self.frames[np.repeat(kept, 2)])
@@ -54,7 +54,7 @@ class Recording:
 
 @cache
 def record(model: str) -> Recording:
-    """Simulates scenarios/MODEL.toml (1 s for all three)."""
+    """Simulate scenarios/MODEL.toml (1 s for all three)."""
     scenario = load(str(SCENARIOS / f"{model}.toml"))
     with LeverBus("lever", config=scenario.config) as bus:
         frames = loop.run(scenario, bus).frames()

@@ -16,7 +16,7 @@ from . import golden, guide, image, measure, port_sizes
 
 
 def run(args: argparse.Namespace) -> int:
-    """The command. Raises LeverError."""
+    """Return the command. Raise LeverError."""
     elf = image.build(args.build, args.firmware, args.flags)
     with Progress("budget") as progress:
         runs = measure.run_all(elf, progress.show)
@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _accept(budget: dict[str, Any], images: Path) -> None:
-    """Makes this the golden values, and what the porting guide says. Raises LeverError."""
+    """Make this the golden values, and what the porting guide says. Raise LeverError."""
     sizes = {name: port_sizes.of_port(name, guide.port_image(images, name)) for name in port_sizes.TRANSPORTS}
     golden.accept(budget)
     values = golden.load()["values"]
@@ -41,7 +41,7 @@ def _accept(budget: dict[str, Any], images: Path) -> None:
 
 
 def _judge(budget: dict[str, Any]) -> int:
-    """Says what does not hold; the exit status."""
+    """Say what does not hold; the exit status."""
     accepted = golden.load()
     complaints = golden.beyond_limits(budget)
     if golden.is_comparable(budget, accepted):
@@ -56,7 +56,7 @@ def _judge(budget: dict[str, Any]) -> int:
 
 
 def tables(budget: dict[str, Any]) -> Tables:
-    """The budget as it is printed."""
+    """Return the budget as it is printed."""
     calibration = budget["calibration"]
     measured: list[Row] = [
         {"how": "processor", "what": budget["processor"]},

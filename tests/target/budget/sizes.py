@@ -17,8 +17,9 @@ RECORDER = ("app/state.c", "app/recorder.c", "can/messages_snapshot.c")
 
 
 def of_core(elf: Path) -> dict[str, int]:
-    """Bytes of text, rodata, data and bss of the core without the recorder, and as "recorder" of both kinds of flash of
-    that: of text what is linked into the image, which has all of the façade; of the others what is in the library."""
+    """Return bytes of text, rodata, data and bss of the core without the recorder, and as "recorder" of both kinds
+    of flash of that: of text what is linked into the image, which has all of the façade; of the others what is in
+    the library."""
     total = dict.fromkeys(("text", "rodata", "data", "bss", "recorder"), 0)
     texts = of_files(elf)
     for name, path in core_objects(elf).items():
@@ -34,13 +35,14 @@ def of_core(elf: Path) -> dict[str, int]:
 
 
 def of_files(elf: Path) -> dict[str, int]:
-    """Bytes of text by source file ("filter/cdkf.c"), as far as its functions have not been taken into others."""
+    """Return bytes of text by source file ("filter/cdkf.c"), as far as its functions have not been taken into
+    others."""
     return of_image(elf).text_by_file()
 
 
 def of_instance(elf: Path) -> dict[str, int]:
-    """Bytes of struct lever and of the union lever_memory that has to hold it, from the debugging information: nobody
-    outside of the core knows the former."""
+    """Return bytes of struct lever and of the union lever_memory that has to hold it, from the debugging
+    information: nobody outside of the core knows the former."""
     output = run_tool("readelf", "--debug-dump=info", core_objects(elf)["app/lever.c"])
     found = {}
     for kind, name in (("structure", "lever"), ("union", "lever_memory")):

@@ -79,7 +79,7 @@ class CallGraph:
                 function.calls.add(names.get(target, target))
 
     def _table(self, file: str, path: Path) -> set[str]:
-        """The functions in the constant tables of a source file."""
+        """Return the functions in the constant tables of a source file."""
         entries = {
             entry for table in _TABLE.findall(run_tool("objdump", "-r", path)) for entry in _ENTRY.findall(table)
         }
@@ -87,7 +87,7 @@ class CallGraph:
         return {name for name in own if name.rpartition(":")[2].partition(".")[0] in entries}
 
     def text_by_file(self) -> dict[str, int]:
-        """Bytes of code in the image, by the source file of the function that it stands in."""
+        """Return bytes of code in the image, by the source file of the function that it stands in."""
         sizes = {name: size for size, name in _SYMBOL.findall(run_tool("nm", "--print-size", self._elf))}
         found: dict[str, int] = {}
         for name, function in self._functions.items():
@@ -95,7 +95,7 @@ class CallGraph:
         return found
 
     def deepest(self, name: str, above: tuple[str, ...] = ()) -> Deepest:
-        """The deepest chain of calls from a function on. Raises LeverError."""
+        """Return the deepest chain of calls from a function on. Raise LeverError."""
         if name in above:
             raise LeverError(f"the call graph has a circle: {' > '.join((*above, name))}")
         if name not in self._known:
@@ -133,14 +133,14 @@ class CallGraph:
 
 
 def pushed_by(elf: Path, name: str) -> tuple[int, bool]:
-    """Bytes that all instructions of a function push, and whether it may call (or is not there)."""
+    """Return bytes that all instructions of a function push, and whether it may call (or is not there)."""
     code = run_tool("objdump", "-d", "--no-show-raw-insn", f"--disassemble={name}", elf)
     pushed = sum(_pushed(registers, subtracted or stored) for registers, subtracted, stored in _PUSH.findall(code))
     return pushed, f"<{name}>:" not in code or re.search(r"\tbl\s", code) is not None
 
 
 def _pushed(registers: str, count: str) -> int:
-    """Bytes of a push of {r4, r5-r7, lr}, or of a step down by a number."""
+    """Return bytes of a push of {r4, r5-r7, lr}, or of a step down by a number."""
     if count:
         return int(count)
     total = 0
@@ -152,11 +152,11 @@ def _pushed(registers: str, count: str) -> int:
 
 
 def of_image(elf: Path) -> CallGraph:
-    """The call graph of the core in the image."""
+    """Return the call graph of the core in the image."""
     return CallGraph(core_objects(elf), elf, call_graph(elf))
 
 
 def worst_case(elf: Path, facade: list[str]) -> dict[str, Deepest]:
-    """The deepest chain of each function of the façade. Raises LeverError."""
+    """Return the deepest chain of each function of the façade. Raise LeverError."""
     graph = of_image(elf)
     return {name: graph.deepest(name) for name in facade}

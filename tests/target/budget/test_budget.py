@@ -51,7 +51,7 @@ def test_a_gap_is_bounded(budget: dict[str, Any]) -> None:
 
 @pytest.fixture
 def accepted(budget: dict[str, Any]) -> dict[str, Any]:
-    """The budget itself as golden values."""
+    """Return the budget itself as golden values."""
     return {"compiler": budget["compiler"], "values": golden.numbers(budget)}
 
 

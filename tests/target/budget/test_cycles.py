@@ -13,7 +13,7 @@ RETURN = Instruction("bx", "lr")
 
 
 def instructions(text: str) -> list[Instruction]:
-    """One a line: mnemonic, then operands."""
+    """Return one a line: mnemonic, then operands."""
     parts = [line.strip().partition(" ") for line in text.strip().splitlines()]
     return [Instruction(mnemonic, operands.strip()) for mnemonic, _, operands in parts]
 

@@ -94,7 +94,7 @@ def test_the_loop_takes_the_stack_that_it_says(can_image: Path) -> None:
 
 @pytest.fixture(scope="module")
 def tasks(tmp_path_factory: pytest.TempPathFactory, root: Path, build_dir: Path) -> Path:
-    """The guide's two tasks, with the loop and self test of the tree, and a stand-in for the RTOS."""
+    """Return the guide's two tasks, with the loop and self test of the tree, and a stand-in for the RTOS."""
     folder = tmp_path_factory.mktemp("tasks")
     (example,) = (text for text in readmes.blocks(guide.GUIDE, "c").values() if "estimator_task" in text)
     (folder / "tasks.c").write_text(example, encoding="utf-8")

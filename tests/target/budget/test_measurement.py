@@ -65,7 +65,7 @@ def said_on_host(model: str, estimator: str, form: str) -> list[Any]:
 
 
 def fields(struct: Any) -> dict[str, Any]:
-    """Of a pointer to one, by name; arrays as lists."""
+    """Return the fields of a pointer to one, by name; arrays as lists."""
     values = {name: getattr(struct, name) for name, _ in ffi.typeof(struct).item.fields}
     return {name: list(value) if isinstance(value, ffi.CData) else value for name, value in values.items()}
 
@@ -145,7 +145,7 @@ def test_no_call_wrote_more_stack_than_was_computed(elf: Path, runs: Runs) -> No
 
 
 def graph_of(tmp_path: Path, source: str) -> stack.CallGraph:
-    """The call graph of a file that is as if it were filter/it.c."""
+    """Return the call graph of a file that is as if it were filter/it.c."""
     folder = tmp_path / "filter"
     folder.mkdir()
     (folder / "it.c").write_text(source)

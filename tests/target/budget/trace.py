@@ -46,7 +46,7 @@ _SYMBOL = re.compile(r"^([0-9a-f]+) ([0-9a-f]+) [tT] (\S+)$", re.MULTILINE)
 
 
 def disassemble(elf: Path) -> dict[int, Instruction]:
-    """Every instruction of the image by its address, in order."""
+    """Return every instruction of the image by its address, in order."""
     text = run_tool("objdump", "-d", "--no-show-raw-insn", elf)
     lines = _INSTRUCTION.findall(text)
     return {int(address, 16): Instruction(mnemonic, operands.strip()) for address, mnemonic, operands in lines}
@@ -59,7 +59,7 @@ def functions(elf: Path) -> list[tuple[int, int, str]]:
 
 
 def _flash(elf: Path) -> bytes:
-    """The image as it is in flash."""
+    """Return the image as it is in flash."""
     with tempfile.NamedTemporaryFile(prefix="lever-budget-") as file:
         run_tool("objcopy", "-O", "binary", elf, file.name)
         return Path(file.name).read_bytes()
@@ -73,7 +73,7 @@ class _Code:
         self._costs: dict[tuple[int, int], tuple[int, int, int]] = {}
 
     def block(self, block: int) -> dict[int, Instruction]:
-        """Those of a block, by address. All are there, as literals are in no block."""
+        """Return those of a block, by address. All are there, as literals are in no block."""
         begin, size = block & 0xFFFFFFFF, block >> 32
         return {address: self._code[address] for address in range(begin, begin + size, 2) if address in self._code}
 
@@ -94,12 +94,12 @@ class _Code:
 
 @cache
 def _code(elf: Path) -> _Code:
-    """Of an image that does not change while this runs."""
+    """Return the code of an image that does not change while this runs."""
     return _Code(elf)
 
 
 def _steps(path: NDArray[np.uint64]) -> Counter[tuple[int, int]]:
-    """How often which block was followed by which."""
+    """Return how often which block was followed by which."""
     return Counter(pairwise(path.tolist()))
 
 
@@ -118,7 +118,7 @@ class Trace:
         """Of each sample, by the model of cycles.py."""
 
     def _costs(self) -> NDArray[np.int64]:
-        """A row of _Code.cost() for each sample, whose last block is not measured."""
+        """Return a row of _Code.cost() for each sample, whose last block is not measured."""
         blocks, kinds = np.unique(np.concatenate(self._paths), return_inverse=True)
         ends = np.cumsum([len(path) for path in self._paths])
         steps = kinds * len(blocks) + np.roll(kinds, -1)
@@ -131,7 +131,7 @@ class Trace:
         return total
 
     def executed(self, samples: Iterable[int]) -> tuple[Counter[int], Counter[int]]:
-        """How often the instruction at an address was executed in these samples, and its cycles."""
+        """Return how often the instruction at an address was executed in these samples, and its cycles."""
         times: Counter[int] = Counter()
         spent: Counter[int] = Counter()
         for sample in samples:
@@ -143,8 +143,8 @@ class Trace:
 
 
 def trace(elf: Path, recording: Recording, model: str, estimator: str, form: str, first: int, last: int) -> Trace:
-    """Runs the image over samples 0 to `last` and follows those from `first` on, or what is measured before (LOOP,
-    INIT). Raises LeverError."""
+    """Run the image over samples 0 to `last` and follow those from `first` on, or what is measured before (LOOP,
+    INIT). Raise LeverError."""
     words = ["budget", "-", form, *arguments(recording, model, estimator, form), "paint=0"]
     return Trace(_code(elf), _Machine(elf, recording.blob(form), words).run(first, last))
 
@@ -188,14 +188,14 @@ class _Machine:
         self._note(unicorn.UC_HOOK_BLOCK, begin + size, _FLASH + _FLASH_BYTES)
 
     def _note(self, kind: int, begin: int, end: int) -> None:
-        """Has path_note() called for what is executed there; hook_add() takes functions in Python only."""
+        """Have path_note() called for what is executed there; hook_add() takes functions in Python only."""
         note = engine.HOOK_CODE_CFUNC(("path_note", _hook()))
         handle = engine.uc_hook_h()
         status = engine.uclib.uc_hook_add(self._uc._uch, ctypes.byref(handle), kind, note, None, begin, end - 1)
         assert status == unicorn.UC_ERR_OK
 
     def run(self, first: int, last: int) -> list[NDArray[np.uint64]]:
-        """The blocks that were executed in each of these samples, and the one after. Raises LeverError."""
+        """Return the blocks that were executed in each of these samples, and the one after. Raise LeverError."""
         self._wanted = range(first, last + 1)
         stack, start = struct.unpack("<II", self._uc.mem_read(_FLASH, 8))
         self._uc.reg_write(arm_const.UC_ARM_REG_SP, stack)

@@ -31,7 +31,7 @@ class Board:
         self.peer = Peer(self.bus)
 
     def start(self) -> None:
-        """Runs until the image is on the bus."""
+        """Run until the image is on the bus."""
         assert self.machine.run(START_LIMIT, lambda: self.can.acknowledges()), "the image does not join the bus"
         self.run(MS)
 
@@ -39,7 +39,7 @@ class Board:
         self.machine.run(time_ns)
 
     def hear(self, count: int, time_ns: int = 100 * MS) -> list[Frame]:
-        """Runs until the peer has heard so many frames more, and returns those."""
+        """Run until the peer has heard so many frames more, and return those."""
         before = len(self.peer.heard)
         self.machine.run(time_ns, lambda: len(self.peer.heard) >= before + count)
         return self.peer.frames()[before:]

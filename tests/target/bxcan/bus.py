@@ -35,7 +35,7 @@ class Error(IntEnum):
 
 class Node(Protocol):
     def offer(self) -> Frame | None:
-        """The frame that this node would send now."""
+        """Return the frame that this node would send now."""
 
     def acknowledges(self) -> bool: ...
     def is_passive(self) -> bool: ...
@@ -71,7 +71,7 @@ class Bus:
         return self._is_busy
 
     def request(self) -> None:
-        """A node has something to send."""
+        """Note that a node has something to send."""
         if not self._is_busy and not self.is_held and any(node.offer() for node in self.nodes):
             self._is_busy = True
             self.schedule.at(self.schedule.now + BIT_NS, self._arbitrate)
@@ -116,7 +116,7 @@ class Bus:
             self.schedule.at(self.schedule.now + bits * BIT_NS, lambda: self._end(frame))
 
     def _end_after(self, bits: int, fail: Action) -> None:
-        """An error flag follows those bits, and then its delimiter."""
+        """Let an error flag follow those bits, and then its delimiter."""
         end = self.schedule.now + (bits + ERROR_FRAME) * BIT_NS
         self.dominant_until = max(self.dominant_until, end - 8 * BIT_NS)
         self.schedule.at(end, fail)

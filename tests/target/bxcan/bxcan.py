@@ -36,7 +36,7 @@ class Surroundings(Protocol):
     def apb1_hz(self) -> float: ...
     def is_can_clocked(self) -> bool: ...
     def can_pin_problem(self) -> str | None:
-        """What is wrong with the pins of CAN1_RX and CAN1_TX."""
+        """Return what is wrong with the pins of CAN1_RX and CAN1_TX."""
 
     def misuse(self, what: str) -> None: ...
 
@@ -144,7 +144,7 @@ class BxCan:
         self._pursue()
 
     def _pursue(self) -> None:
-        """Starts towards the mode that MCR asks for."""
+        """Start towards the mode that MCR asks for."""
         wanted = self._wanted()
         if wanted == self.mode or self._is_changing:
             return
@@ -191,7 +191,7 @@ class BxCan:
         return before / (before + 1 + (self.btr >> 20 & 7))
 
     def _check_fitness(self) -> bool:
-        """Whether the bus and this node will understand each other."""
+        """Return whether the bus and this node will understand each other."""
         problems = []
         if self.btr == BTR_RESET:
             problems.append("BTR has not been set")
@@ -257,7 +257,7 @@ class BxCan:
             self._count(error, self.confinement.receive_failed)
 
     def _count(self, error: Error, count: Action) -> None:
-        """Counts an error, and tells of what the counters have then reached."""
+        """Count an error, and report what the counters have reached."""
         before = self.confinement.register()
         count()
         self.lec = error
@@ -281,7 +281,7 @@ class BxCan:
     # --- interrupts (32.8) -------------------------------------------------------------------------------------
 
     def interrupts(self) -> set[int]:
-        """Numbers (table 62) of the interrupts asked for now."""
+        """Return numbers (table 62) of the interrupts asked for now."""
         asked = set()
         if self.ier & TMEIE and any(box.status & mailboxes.RQCP for box in self.tx.boxes):
             asked.add(TX_IRQ)

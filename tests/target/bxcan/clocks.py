@@ -118,7 +118,7 @@ class Clocks:
             self.ready |= bit
 
     def break_crystal(self) -> None:
-        """The crystal stops. The clock security system notices (7.2.7): HSI takes over, and an NMI says so."""
+        """Stop the crystal. The clock security system notices (7.2.7): HSI takes over, and an NMI says so."""
         self.hse_hz = 0
         self.ready &= ~HSEON
         if self.registers[CR] & CSSON:

@@ -31,7 +31,7 @@ class Confinement:
         self.receive = max(0, self.receive - 1) if self.receive < PASSIVE else 120
 
     def send_failed(self, error: Error) -> None:
-        """A missing acknowledgement does not drive a passive node, alone on its bus, into bus-off."""
+        """Handle a missing acknowledgement, which does not drive a passive node, alone on its bus, into bus-off."""
         if not (error is Error.ACKNOWLEDGE and self.is_passive):
             self.transmit = min(BUS_OFF, self.transmit + 8)
 

@@ -33,7 +33,7 @@ def make_board(can_image: Path) -> Iterator[Callable[..., Board]]:
 
 @pytest.fixture
 def board(make_board: Callable[..., Board]) -> Board:
-    """A board whose image is on the bus, as if it had been built to take COMMANDs, which tests send."""
+    """Return a board whose image is on the bus, as if it had been built to take COMMANDs, which tests send."""
     new_board = make_board(takes_commands=True)
     new_board.start()
     return new_board
@@ -41,6 +41,6 @@ def board(make_board: Callable[..., Board]) -> Board:
 
 @pytest.fixture
 def talk(board: Board) -> Iterator[Talk]:
-    """A conversation with that board."""
+    """Yield a conversation with that board."""
     with Talk(board) as conversation:
         yield conversation

@@ -47,7 +47,7 @@ class Cortex:
     # --- exceptions --------------------------------------------------------------------------------------------
 
     def priority(self, exception: int) -> int:
-        """Of an exception (interrupts from 16 on); four bits are there."""
+        """Return the priority of an exception (interrupts from 16 on); four bits are there."""
         if exception in (NMI, HARD_FAULT):
             return exception - 4
         return self.priorities[exception - 16] if exception >= 16 else self.system_priorities[exception - 4]
@@ -60,7 +60,7 @@ class Cortex:
         self.pending |= {16 + number for number in interrupts} - set(self.active)
 
     def next_exception(self) -> int | None:
-        """The pending exception that would be taken if none were masked."""
+        """Return the pending exception that would be taken if none were masked."""
         ready = [each for each in self.pending if each < 16 or each - 16 in self.enabled]
         first = min(ready, key=lambda each: (self.priority(each), each), default=None)
         return first if first is not None and self.priority(first) < self.execution_priority() else None
@@ -135,7 +135,7 @@ class Cortex:
     # --- SysTick (B3.3) ----------------------------------------------------------------------------------------
 
     def _tick_ns(self, ticks: int) -> int:
-        """Time of so many ticks; the reference clock is HCLK/8 (RM0090 6.2)."""
+        """Return time of so many ticks; the reference clock is HCLK/8 (RM0090 6.2)."""
         divider = 1 if self.registers.get(CSR, 0) & 4 else 8
         return round(ticks * divider * 1e9 / self.hclk())
 

@@ -25,7 +25,7 @@ class Image:
         return [FLASH + k for k in range(0, len(self.flash) - 1, 2) if self.flash[k : k + 2] == instruction]
 
     def describe(self, address: int) -> str:
-        """The function that an address is in, for a person."""
+        """Return the function that an address is in, for a person."""
         index = bisect.bisect_right(self._functions, (address, "\uffff")) - 1
         if index < 0:
             return f"at {address:#x}"

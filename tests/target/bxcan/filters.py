@@ -16,13 +16,13 @@ NAMES = {FM1R: "FM1R", FS1R: "FS1R", FFA1R: "FFA1R", FA1R: "FA1R"}
 
 
 def image_32(frame: Frame) -> int:
-    """Identifier, IDE and RTR of a frame as a 32-bit filter sees them."""
+    """Return identifier, IDE and RTR of a frame as a 32-bit filter sees them."""
     identifier = frame.identifier << 3 if frame.extended else frame.identifier << 21
     return identifier | frame.extended << 2 | frame.remote << 1
 
 
 def image_16(frame: Frame) -> int:
-    """The same for a 16-bit filter: STID, RTR, IDE, EXID[17:15]."""
+    """Return the same for a 16-bit filter: STID, RTR, IDE, EXID[17:15]."""
     if frame.extended:
         base, top = frame.identifier >> 18, frame.identifier >> 15 & 7
         return base << 5 | frame.remote << 4 | 1 << 3 | top
@@ -74,7 +74,7 @@ class Filters:
         self.registers[offset] = value & ALL_BANKS
 
     def _matches(self, bank: int, frame: Frame) -> list[bool]:
-        """Of each filter in a bank, in the order of their numbers."""
+        """Return the matches of each filter in a bank, in the order of their numbers."""
         one, two = self.banks[bank]
         is_list = self._bit(FM1R, bank)
         if self._bit(FS1R, bank):

@@ -41,7 +41,7 @@ class Latency:
             self._slow(board, access)
 
     def _slow(self, board: Board, access: str) -> None:
-        """An access to a peripheral takes longer."""
+        """Make an access to a peripheral take longer."""
         real = getattr(board.chip, access)
 
         def slowed(*arguments: int) -> Any:

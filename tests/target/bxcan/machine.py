@@ -115,7 +115,7 @@ class Machine:
     # --- running -----------------------------------------------------------------------------------------------
 
     def run(self, time_ns: int, until: Callable[[], bool] = lambda: False) -> bool:
-        """Runs so long, or until it is so after some slice; returns whether it has become so."""
+        """Run so long, or until it is so after some slice; return whether it has become so."""
         end = self.schedule.now + time_ns
         while not until():
             if self.schedule.now >= end:
@@ -239,7 +239,7 @@ class Machine:
     # --- tampering ---------------------------------------------------------------------------------------------
 
     def patch(self, symbol: str, code: bytes) -> Callable[[], None]:
-        """Replaces the beginning of a function; returns what undoes it."""
+        """Replace the beginning of a function; return what undoes it."""
         address = self.image.symbols[symbol]
         before = bytes(self.cpu.mem_read(address, len(code)))
 
@@ -251,7 +251,7 @@ class Machine:
         return lambda: write(before)
 
     def answer(self, symbol: str, value: int) -> None:
-        """A function returns this at once, as long as the machine lasts."""
+        """Make a function return this at once, as long as the machine lasts."""
 
         def instead(cpu: Uc, *_: object) -> None:
             cpu.reg_write(arm.UC_ARM_REG_R0, value)

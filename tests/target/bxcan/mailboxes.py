@@ -47,7 +47,7 @@ class Mailboxes:
         self._requests = itertools.count()
 
     def _ranked(self) -> list[Mailbox]:
-        """Those pending, the first to be sent first; of equal identifiers the lower mailbox."""
+        """Return those pending, the first to be sent first; of equal identifiers the lower mailbox."""
         pending = [box for box in self.boxes if box.is_pending]
         if self.by_request:
             return sorted(pending, key=lambda box: box.order)
@@ -58,12 +58,12 @@ class Mailboxes:
         return ranked[0] if ranked else None
 
     def read(self, offset: int) -> int:
-        """Offset counts from CAN_TI0R."""
+        """Return offset counts from CAN_TI0R."""
         box = self.boxes[offset // 16]
         return (box.identifier | box.is_pending, box.length, box.low, box.high)[offset // 4 % 4]
 
     def write(self, offset: int, value: int) -> bool:
-        """Returns whether a transmission has been requested."""
+        """Return whether a transmission has been requested."""
         number, register = offset // 16, offset // 4 % 4
         box = self.boxes[number]
         if box.is_pending:
@@ -110,7 +110,7 @@ class Mailboxes:
                 self._abort(box)
 
     def _abort(self, box: Mailbox) -> None:
-        """An empty mailbox stays as it is (32.9.2)."""
+        """Abort a mailbox; an empty one stays as it is (32.9.2)."""
         if box is self.sending:
             box.status |= ABRQ
         elif box.is_pending:

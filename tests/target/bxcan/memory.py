@@ -28,14 +28,14 @@ class Bit:
 
 
 def _before_reads(cpu: Uc, bit: Bit, spoil: Callable[[], None]) -> Callable[[], None]:
-    """Calls spoil() before each read of the word; what is returned ends that."""
+    """Call spoil() before each read of the word; what is returned ends that."""
     cpu.ctl_flush_tb()  # what has run already has been translated without the hook
     hook = cpu.hook_add(UC_HOOK_MEM_READ, lambda *_: spoil(), None, bit.address, bit.address + 3)
     return lambda: cpu.hook_del(hook)
 
 
 def _at_writes(cpu: Uc, bit: Bit, act: Callable[[int, int], None]) -> Callable[[], None]:
-    """Calls act(old, new) with the bit, before each write of its whole word."""
+    """Call act(old, new) with the bit, before each write of its whole word."""
 
     def write(_cpu: Uc, _kind: int, address: int, size: int, value: int, _data: object) -> None:
         assert (address, size) == (bit.address, 4), "written in parts"
@@ -46,12 +46,12 @@ def _at_writes(cpu: Uc, bit: Bit, act: Callable[[int, int], None]) -> Callable[[
 
 
 def stuck(cpu: Uc, bit: Bit, value: int) -> Callable[[], None]:
-    """The bit is always read as `value`. What is returned mends it."""
+    """Let the bit always be read as `value`. What is returned mends it."""
     return _before_reads(cpu, bit, lambda: bit.put(cpu, value))
 
 
 def no_transition(cpu: Uc, bit: Bit, to: int) -> None:
-    """The bit cannot change to `to` once it is the other."""
+    """Forbid a bit to change to `to` once it is the other."""
     keeps = False
 
     def written(old: int, new: int) -> None:

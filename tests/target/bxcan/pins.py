@@ -38,7 +38,7 @@ class Port:
             self.misuse(f"GPIO{self.name}: writes {size} bytes at {offset:#x}")
 
     def function(self, pin: int) -> int | None:
-        """The alternate function of a pin, if it has one."""
+        """Return the alternate function of a pin, if it has one."""
         if self.registers[MODER] >> 2 * pin & 3 != ALTERNATE:
             return None
         return self.registers[AFRL if pin < 8 else AFRH] >> 4 * (pin % 8) & 15

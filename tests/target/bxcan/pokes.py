@@ -64,7 +64,7 @@ class Desk:
         assert not self.read(MSR) & INAK
 
     def load(self, mailbox: int, frame: Frame) -> None:
-        """Requests a transmission."""
+        """Request a transmission."""
         at = MAILBOXES + 16 * mailbox
         data = frame.data.ljust(8, b"\0")
         self.write(at + 4, frame.length)

@@ -25,7 +25,7 @@ class Schedule:
         return self._queue[0][0] if self._queue else None
 
     def advance(self, time_ns: int) -> None:
-        """Does what is due until then, in order, each at its own time."""
+        """Do what is due until then, in order, each at its own time."""
         while self._queue and self._queue[0][0] <= time_ns:
             due, _, action = heapq.heappop(self._queue)
             self.now = max(self.now, due)
@@ -47,7 +47,7 @@ class Timers:
         self.schedule.at(time_ns, self.guard(action))
 
     def guard(self, action: Action) -> Action:
-        """Does nothing when it comes after a cancel()."""
+        """Do nothing when it comes after a cancel()."""
         generation = self._generation
         return lambda: action() if generation == self._generation else None
 

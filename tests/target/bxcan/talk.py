@@ -20,7 +20,7 @@ _encode_lever, _encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE
 
 
 def sample(k: int) -> tuple[Frame, Frame]:
-    """The two frames of sample k of a lever that swings, at 1 kHz."""
+    """Return the two frames of sample k of a lever that swings, at 1 kHz."""
     phase = 2.0 * math.pi * 3.0 * k * 1e-3
     theta, theta_dot = 0.35 + 0.02 * math.sin(phase), 0.02 * 6.0 * math.pi * math.cos(phase)
     lever = _encode_lever(k, theta, theta_dot, 0.3 * math.cos(2.3 * phase))
@@ -50,7 +50,7 @@ class Talk:
         self.reference.shutdown()
 
     def send(self) -> None:
-        """The next sample, to both."""
+        """Send the next sample to both."""
         self.tell(*sample(self.next))
         self.next += 1
 
@@ -64,12 +64,12 @@ class Talk:
             self.reference.send(can.Message(arbitration_id=frame.identifier, data=frame.data, is_extended_id=False))
 
     def expected(self) -> list[Frame]:
-        """What the firmware in this process has answered since the last call."""
+        """Return what the firmware in this process has answered since the last call."""
         messages = list(iter(lambda: self.reference.recv(0), None))
         return [Frame(message.arbitration_id, bytes(message.data)) for message in messages if message is not None]
 
     def ask(self) -> list[Frame]:
-        """Sends a sample and returns what the image answers, up to its STATE_ESTIMATE."""
+        """Send a sample and return what the image answers, up to its STATE_ESTIMATE."""
         heard = self.board.peer.heard
         before = len(heard)
         self.send()
@@ -78,7 +78,7 @@ class Talk:
         return [frame for _, frame in heard[before:]]
 
     def report(self, name: str) -> dict[str, float]:
-        """Goes on until the image sends this message, and returns its values."""
+        """Goes on until the image sends this message, and return its values."""
         identifier = codec.message(name).frame_id
         for _ in range(1000):
             for frame in self.ask():

@@ -32,7 +32,8 @@ def wait_stale(board: Board, count: int) -> None:
 
 @pytest.fixture
 def latency(talk: Talk, board: Board) -> Latency:
-    """Of traffic with motor commands, the march, queues of frames that are too old, a FIFO that is full, a bus-off."""
+    """Return the latency of traffic with motor commands, the march, queues of frames that are too old, a FIFO that
+    is full, a bus-off."""
     for _ in range(20):
         talk.ask()
     measured = Latency(board)

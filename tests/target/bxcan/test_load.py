@@ -14,7 +14,7 @@ FOREIGN = Frame(0x7FF, b"\x55" * 8)
 
 
 def fill(board: Board, frame: Frame, time_ns: int) -> Peer:
-    """Another node that leaves no gap, for so long."""
+    """Return another node that leaves no gap, for so long."""
     peer = Peer(board.bus)
     peer.send(*[frame] * (time_ns // (len(frame.wire) * 1000)))
     return peer

@@ -39,7 +39,7 @@ class March:
         return int(cpu.reg_read(arm.UC_ARM_REG_R0))
 
     def finds(self, spoil: Callable[[Uc], object]) -> bool:
-        """Whether some background finds what is wrong with the memory."""
+        """Return whether some background finds what is wrong with the memory."""
         cpu = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
         cpu.ctl_set_cpu_model(arm.UC_CPU_ARM_CORTEX_M4)
         cpu.mem_map(FLASH, 1 << 20)
@@ -61,7 +61,7 @@ def march(can_image: Path) -> March:
 
 
 def bits(count: int) -> list[Bit]:
-    """The first and the last, and others."""
+    """Return the first and the last, and others."""
     draw = random.Random(1)
     chosen = [Bit(SLICE, 0), Bit(SLICE + 4 * (WORDS - 1), 31)]
     return chosen + [Bit(SLICE + 4 * draw.randrange(WORDS), draw.randrange(32)) for _ in range(count)]

@@ -33,7 +33,7 @@ def seed(board: Board, register: int, fault: Callable[[int], int | None]) -> Non
 
 
 def misuses(talk: Talk, board: Board) -> None:
-    """What the fixtures check at the end of every test."""
+    """Check at the end of every test what the fixtures have noted."""
     talk.ask()
     assert board.chip.misuses == []
 

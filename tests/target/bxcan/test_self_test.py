@@ -30,7 +30,7 @@ CAUSES = {
 
 
 def failed(board: Board) -> int:
-    """What PLATFORM_RESET will say."""
+    """Return what PLATFORM_RESET will say."""
     return board.machine.word("reset", 4) >> 16 & 0xFF
 
 
@@ -140,7 +140,7 @@ def test_stack_that_has_reached_its_end_is_found_and_told_each_second(talk: Talk
 
 
 def expect_watchdog(board: Board, samples: bool = True) -> None:
-    """Goes on until the watchdog resets."""
+    """Go on until the watchdog resets."""
     since = board.schedule.now
     if samples:
         for k in range(150):

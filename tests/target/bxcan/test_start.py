@@ -19,7 +19,7 @@ REGISTERS = {bxcan.MCR: "MCR", bxcan.BTR: "BTR", bxcan.IER: "IER", filters.FMR: 
 
 
 def note_writes(board: Board) -> list[tuple[str, int]]:
-    """Notes each write to a register of CAN1 by its name, with the value."""
+    """Note each write to a register of CAN1 by its name, with the value."""
     written: list[tuple[str, int]] = []
     write = board.can.write
 

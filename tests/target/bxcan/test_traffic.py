@@ -112,7 +112,7 @@ def test_keeps_up_with_samples_each_millisecond(talk: Talk, board: Board) -> Non
 
 
 def send_ahead_of(talk: Talk, urgent: Peer, count: int) -> None:
-    """Sends a sample, and has so many urgent frames ready before it can be answered."""
+    """Send a sample, with so many urgent frames ready before it can be answered."""
     board = talk.board
     talk.send()
     assert board.machine.run(MS, lambda: len(board.peer.queue) == 1 and board.bus.sender is board.peer)

@@ -38,13 +38,13 @@ Frame = tuple[str, str, str]
 
 
 def overrides(model: str, estimator: str) -> list[str]:
-    """A short run with the settings of the image, which are the defaults."""
+    """Return a short run with the settings of the image, which are the defaults."""
     torque = [] if model == "linear_black_box" else [TORQUE]
     return [f"duration={SECONDS} s", "settings={}", "limits={}", f"estimator.estimator={estimator}", *torque]
 
 
 def estimate_frames(log: str) -> list[Frame]:
-    """What the estimator has sent, of the messages compared."""
+    """Return what the estimator has sent, of the messages compared."""
     names = {f"{codec.message(name).frame_id:03X}": name for name in ESTIMATES}
     return [(time, names[identifier], data) for time, identifier, data in FRAME.findall(log) if identifier in names]
 
@@ -66,7 +66,7 @@ def in_this_process(model: str, estimator: str) -> list[Frame]:
 
 
 def take_processor(free: Iterator[int]) -> None:
-    """Keeps a thread, and what it runs, on a processor of its own."""
+    """Keep a thread, and what it runs, on a processor of its own."""
     os.sched_setaffinity(0, {next(free)})
 
 
@@ -74,7 +74,7 @@ def take_processor(free: Iterator[int]) -> None:
 def board_runs(
     slcan_image: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[dict[tuple[str, str], Future[list[Frame]]]]:
-    """All runs on the board, one at a time for each processor."""
+    """Yield all runs on the board, one at a time for each processor."""
     processors = os.sched_getaffinity(0)
     folder = tmp_path_factory.mktemp("board")
     with ThreadPoolExecutor(len(processors), initializer=take_processor, initargs=(iter(processors),)) as pool:

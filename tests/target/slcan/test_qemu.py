@@ -27,7 +27,7 @@ LEVER = str(Path(sys.executable).with_name("lever"))
 
 @pytest.fixture(scope="module")
 def channel(slcan_image: Path) -> Iterator[str]:
-    """Of the image on the emulated board, for all tests of this file."""
+    """Yield the channel of the image on the emulated board, for all tests of this file."""
     with qemu.running(slcan_image, count_instructions=True) as name:
         yield name
 
@@ -91,7 +91,7 @@ def test_it_ends_with_its_board(slcan_image: Path, number: signal.Signals, statu
 
 
 def says(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """The one line with which the command refuses."""
+    """Return the one line with which the command refuses."""
     assert cli.main(["qemu", *arguments]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""

@@ -60,14 +60,14 @@ class Debugger:
         return packet[packet.index(b"$") + 1 :].decode()
 
     def ask(self, packet: str) -> str:
-        """The answer to a packet; that the core has halted, which QEMU tells at any time, is not one."""
+        """Return the answer to a packet; that the core has halted, which QEMU tells at any time, is not one."""
         self._line.sendall(f"${packet}#{sum(packet.encode()) % 256:02x}".encode())
         while (answer := self._read_packet()).startswith("T"):
             pass
         return answer
 
     def stop(self) -> None:
-        """Halts the core."""
+        """Halt the core."""
         self._line.sendall(b"\x03")
         while not self._read_packet().startswith("T"):
             pass
@@ -97,7 +97,7 @@ class Board:
         return Debugger(self._debugger_path)
 
     def command(self, text: str) -> str:
-        """The answer to an SLCAN command, without its CR."""
+        """Return the answer to an SLCAN command, without its CR."""
         self._line.sendall(text.encode() + b"\r")
         return self.read_line()
 
@@ -105,7 +105,7 @@ class Board:
         self._line.sendall(text.encode())
 
     def read_line(self) -> str:
-        """The next that the image says, without its CR."""
+        """Return the next that the image says, without its CR."""
         while b"\r" not in self._received:
             more = self._line.recv(4096)
             assert more, "QEMU has ended"
@@ -114,7 +114,7 @@ class Board:
         return line.decode("latin-1")
 
     def wait_for_answer(self) -> None:
-        """Waits until the image answers: USART1 is the last thing that it starts."""
+        """Wait until the image answers: USART1 is the last thing that it starts."""
         self._line.settimeout(0.2)
         end = time.monotonic() + ANSWER_TIME
         answer = b""
@@ -131,7 +131,7 @@ class Board:
             line = self.read_line()
 
     def platform_health(self) -> dict[str, float]:
-        """What PLATFORM_HEALTH and PLATFORM_RESET say after some samples of a lever that rests."""
+        """Return what PLATFORM_HEALTH and PLATFORM_RESET say after some samples of a lever that rests."""
         assert self.command("O") == ""
         lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
         said: dict[str, dict[str, float]] = {}
@@ -149,7 +149,7 @@ class Board:
         raise AssertionError("no PLATFORM_HEALTH or no PLATFORM_RESET in 300 samples")
 
     def _answers(self) -> Iterator[tuple[int, bytes]]:
-        """The frames of one step, the last of which is STATE_ESTIMATE."""
+        """Yield the frames of one step, the last of which is STATE_ESTIMATE."""
         identifier = 0
         while identifier != 0x210:
             line = self.read_line()
@@ -160,7 +160,7 @@ class Board:
 
 @contextmanager
 def running(image: Path, folder: Path) -> Iterator[Board]:
-    """Starts QEMU with an image (.elf or .bin) and ends it at the end."""
+    """Start QEMU with an image (.elf or .bin), and end it at the end."""
     usart, debugger = folder / "usart", folder / "debugger"
     process = subprocess.Popen(
         [

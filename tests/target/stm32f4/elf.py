@@ -16,19 +16,19 @@ def tool(name: str, *arguments: str | Path) -> str:
 
 
 def symbol(elf: Path, name: str) -> int:
-    """The address of a symbol."""
+    """Return the address of a symbol."""
     match = re.search(rf"^([0-9a-f]+) \w {name}$", tool("nm", elf), re.MULTILINE)
     assert match, f"{elf} has no {name}"
     return int(match[1], 16)
 
 
 def flash_bytes(elf: Path) -> bytearray:
-    """The contents of flash: the .bin beside the .elf."""
+    """Return the contents of flash: the .bin beside the .elf."""
     return bytearray(elf.with_suffix(".bin").read_bytes())
 
 
 def put_crc(flash: bytearray) -> None:
-    """Makes the CRC good again, as only a build does."""
+    """Make the CRC good again, as only a build does."""
     flash[-4:] = zlib.crc32(flash[:-4]).to_bytes(4, "little")
 
 

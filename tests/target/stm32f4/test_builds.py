@@ -42,7 +42,7 @@ def build(folder: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Of one build for all tests here, with an aircraft and 29-bit identifiers."""
+    """Return the folder of one build for all tests here, with an aircraft and 29-bit identifiers."""
     made = tmp_path_factory.mktemp("image")
     (made / "my.aircraft").write_text(AIRCRAFT)
     done = configure(made / "build", f"-DLEVER_AIRCRAFT_FILE={made / 'my.aircraft'}", f"-DLEVER_ID_BASE={BASE:#x}")
@@ -51,7 +51,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def samples() -> Iterator[list[tuple[int, bytes]]]:
-    """Of a lever that an arm holds, shaken at three frequencies."""
+    """Yield the samples of a lever that an arm holds, shaken at three frequencies."""
     theta, rate = 0.0, 0.0
     for k in range(SAMPLES):
         base = sum(math.sin(2.0 * math.pi * f * k * 1e-3 + f) for f in (1.7, 3.3, 5.9))
@@ -64,7 +64,7 @@ def samples() -> Iterator[list[tuple[int, bytes]]]:
 
 
 def answers_of(board: Board) -> list[tuple[int, bytes]]:
-    """Of one step, with 29-bit identifiers, but for what the machine says of itself."""
+    """Return the answers of of one step, with 29-bit identifiers, but for what the machine says of itself."""
     answers: list[tuple[int, bytes]] = []
     while not answers or answers[-1][0] != 0x210:
         line = board.read_line()

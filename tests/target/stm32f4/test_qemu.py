@@ -30,7 +30,7 @@ def faults_of(image: Path, folder: Path) -> float:
 
 
 def go_on_until(condition: Callable[[], bool], debugger: Debugger) -> None:
-    """Lets the core run, a moment at a time, until something has become true of its memory."""
+    """Let the core run, a moment at a time, until something has become true of its memory."""
     end = time.monotonic() + ANSWER_TIME
     while not condition():
         assert time.monotonic() < end

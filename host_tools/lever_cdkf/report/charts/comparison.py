@@ -9,7 +9,7 @@ POINTS = 1500
 
 
 def recorded(run: Run) -> Figure | None:
-    """Every quantity of which the log has an estimate."""
+    """Return every quantity of which the log has an estimate."""
     compared = [quantity for quantity in run.quantities if run.column(_recorded(quantity)) is not None]
     if not compared:
         return None

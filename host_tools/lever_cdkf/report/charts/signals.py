@@ -17,7 +17,7 @@ STATES = (("theta", "_rad", "angle θ [deg]"), ("theta_dot", "_rad_s", "rate θ�
 
 
 def motion(run: Run) -> Figure | None:
-    """Angle and rate of the lever over the whole run."""
+    """Return angle and rate of the lever over the whole run."""
     rows = [axis(title) for _, _, title in STATES]
     figure = Figure(rows, time_axis(run.end), 420)
     for row, (key, suffix, _) in enumerate(STATES):
@@ -31,7 +31,7 @@ def motion(run: Run) -> Figure | None:
 
 
 def detail(run: Run, seconds: float = 2.0, points: int = 1000) -> Figure | None:
-    """The same, close up: every sample of a few short stretches, chosen by button."""
+    """Return the same, close up: every sample of a few short stretches, chosen by button."""
     rows = [axis(title) for _, _, title in STATES]
     figure = Figure(rows, time_axis(seconds), 420, over_time=False)
     owners: list[int] = []
@@ -73,7 +73,7 @@ def _look(kind: str) -> tuple[str, dict[str, Any]]:
 
 
 def _stretches(run: Run, seconds: float) -> dict[str, float]:
-    """Label and start [s] of the stretches worth a close look."""
+    """Return label and start [s] of the stretches worth a close look."""
     last = max(0.0, run.end - seconds)
     starts = {"start": 0.0}
     if run.changes:
@@ -83,7 +83,8 @@ def _stretches(run: Run, seconds: float) -> dict[str, float]:
 
 
 def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
-    """Normalised innovation squared per output, averaged over short stretches, and the band that chance alone gives."""
+    """Return normalised innovation squared per output, averaged over short stretches, and the band that chance alone
+    gives."""
     averages = run.innovations(seconds)
     if averages is None or not (filled := averages.freedom > 0).any():
         return None
@@ -103,7 +104,7 @@ def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
 
 
 def whiteness(run: Run) -> Figure | None:
-    """Autocorrelation of the residual of the rate with the band of chance and the limits of a right model."""
+    """Return autocorrelation of the residual of the rate with the band of chance and the limits of a right model."""
     result = run.whiteness
     if result is None:
         return None
@@ -127,7 +128,7 @@ def whiteness(run: Run) -> Figure | None:
 
 
 def excitation(run: Run) -> Figure | None:
-    """What shakes the lever: base acceleration, motor torque, and the estimator's own measure of the motion."""
+    """Return what shakes the lever: base acceleration, motor torque, and the estimator's own measure of the motion."""
     base = run.first_of("z_ddot_true_m_s2", "z_ddot_measured_m_s2")
     torque = run.first_of("tau_m_true_N_m", "tau_m_measured_N_m")
     level = run.column("excitation_rad_s")

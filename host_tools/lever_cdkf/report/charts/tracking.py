@@ -11,12 +11,12 @@ POINTS = 1500
 
 
 def parameters(run: Run) -> Figure | None:
-    """Those of the estimator's model over time."""
+    """Return those of the estimator's model over time."""
     return _tracked(run, run.parameters, height=580)
 
 
 def dynamics(run: Run) -> Figure | None:
-    """Natural frequency and damping ratio over time."""
+    """Return natural frequency and damping ratio over time."""
     return _tracked(run, DYNAMICS, height=420)
 
 

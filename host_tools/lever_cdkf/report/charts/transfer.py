@@ -22,7 +22,7 @@ DEGREES = 180.0 / np.pi
 
 
 def _times(run: Run, count: int) -> np.ndarray:
-    """Indices of `count` samples, from the first estimate on."""
+    """Return indices of `count` samples, from the first estimate on."""
     estimates = run.first_of(*(quantity.column("estimate") for quantity in run.parameters))
     started = np.flatnonzero(np.isfinite(run.time if estimates is None else estimates))
     chosen: np.ndarray = started[spread_indices(len(started), count)]
@@ -30,7 +30,7 @@ def _times(run: Run, count: int) -> np.ndarray:
 
 
 def _responses(run: Run, chosen: np.ndarray, frequencies: Array) -> dict[str, np.ndarray]:
-    """The responses [deg/(m/s²)] of truth and estimate at the samples, as far as they are known."""
+    """Return the responses [deg/(m/s²)] of truth and estimate at the samples, as far as they are known."""
     followed = run.followed_trim
     responses: dict[str, np.ndarray] = {}
     if followed is None:
@@ -50,7 +50,7 @@ def _responses(run: Run, chosen: np.ndarray, frequencies: Array) -> dict[str, np
 
 
 def maps(run: Run) -> dict[str, Figure]:
-    """Magnitude over time and frequency: a figure for "truth" and one for "estimate", in the same colours."""
+    """Return magnitude over time and frequency: a figure for "truth" and one for "estimate", in the same colours."""
     chosen = _times(run, TIMES)
     time, responses = run.time[chosen], _responses(run, chosen, FREQUENCIES)
     magnitudes = {name: np.abs(values).T for name, values in responses.items()}
@@ -85,7 +85,7 @@ def _map(run: Run, time: Array, magnitude: Array, name: str, brightest: float) -
 
 
 def slices(run: Run) -> Figure | None:
-    """Magnitude and phase over frequency at one time, with a slider for the time, and the measured coherence."""
+    """Return magnitude and phase over frequency at one time, with a slider for the time, and the measured coherence."""
     chosen = _times(run, SLICES)
     time, responses = run.time[chosen], _responses(run, chosen, FREQUENCIES)
     if not responses:
@@ -116,7 +116,7 @@ def slices(run: Run) -> Figure | None:
 
 
 def _bands(run: Run, time: Array, estimate: np.ndarray) -> list[list[tuple[Array, Array]]]:
-    """Low and high edge over BAND, of magnitude and of phase, at each time: ±2σ of what was sent, between its
+    """Return low and high edge over BAND, of magnitude and of phase, at each time: ±2σ of what was sent, between its
     frequencies by straight lines. Nothing where nothing was sent."""
     sent = run.feedthrough.at(time)
     if not np.isfinite(sent["gain_sigma"] + sent["phase_sigma"]).all(axis=1).any():
@@ -133,13 +133,13 @@ def _bands(run: Run, time: Array, estimate: np.ndarray) -> list[list[tuple[Array
 
 
 def _shown(bands: list[list[tuple[Array, Array]]], wanted: int) -> int:
-    """The time to begin with: the one nearest to `wanted` at which all of the band is known."""
+    """Return the time to begin with: the one nearest to `wanted` at which all of the band is known."""
     complete = [index for index, edges in enumerate(bands[0] if bands else []) if np.isfinite(edges).all()]
     return min(complete, key=lambda index: abs(index - wanted), default=wanted)
 
 
 def _add_coherence(run: Run, figure: Figure) -> None:
-    """A row for the measured coherence of the whole run, and what chance alone would give."""
+    """Add a row for the measured coherence of the whole run, and for what chance alone would give."""
     measured = run.coherence
     if measured is None or measured.windows < 2:
         return

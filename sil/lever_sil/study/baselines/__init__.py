@@ -32,7 +32,7 @@ class Baseline:
     """The classes of models that it can be used with; by default any."""
 
     def handles(self, model: Model) -> bool:
-        """Whether it can be used with a model."""
+        """Return whether it can be used with a model."""
         return isinstance(model, self.models)
 
 

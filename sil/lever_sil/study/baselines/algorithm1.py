@@ -97,7 +97,7 @@ class ParameterFilter:
 
 
 def differences(values: Array) -> tuple[Array, Array, Array]:
-    """Mean (B, m), first and second differences (B, n, m) of values (B, 2n + 1, m) at sigma points."""
+    """Return mean (B, m), first and second differences (B, n, m) of values (B, 2n + 1, m) at sigma points."""
     n = values.shape[1] // 2
     centre, plus, minus = values[:, :1], values[:, 1 : n + 1], values[:, n + 1 :]
     both = plus + minus

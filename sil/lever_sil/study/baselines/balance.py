@@ -91,7 +91,7 @@ class Balance:
 
 
 def balance(batch: Batch) -> Balance:
-    """Of what was measured. Raises LeverError for a model that is none of MODELS."""
+    """Return the balance of what was measured. Raise LeverError for a model that is none of MODELS."""
     if isinstance(batch.model, Lever):
         return _of_lever(batch, batch.model)
     if isinstance(batch.model, LinearPhysical):
@@ -113,13 +113,13 @@ def _of_black_box(batch: Batch, model: LinearBlackBox) -> Balance:
 
 
 def _position(batch: Batch, rest: float) -> Array:
-    """(B, K) of a linear model, from where its spring rests."""
+    """Return (B, K) of a linear model, from where its spring rests."""
     position: Array = batch.y[:, :, 0]
     return position if batch.model.preload == "trim" else position - rest
 
 
 def _of_lever(batch: Batch, lever: Lever) -> Balance:
-    """Each term is read off the lever: with a parameter 0 and 1, as all are linear in the parameters."""
+    """Read each term off the lever: with a parameter 0 and 1, as all are linear in the parameters."""
     zero, one = np.zeros(1), np.ones(1)
     theta, rate = batch.y[:, :, 0] + batch.trim, batch.y[:, :, 1]
     z_ddot, torque = np.moveaxis(batch.u, 2, 0)

@@ -35,7 +35,7 @@ from .recursion import (
 
 
 def dual_ekf(batch: Batch, at: NDArray[np.int64]) -> Estimates:
-    """Runs over the whole batch."""
+    """Run over the whole batch."""
     return followed("DUAL_EKF", batch, at, DualEkf)
 
 

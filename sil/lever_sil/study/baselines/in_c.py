@@ -44,7 +44,7 @@ def followed(
 def _run(
     kind: str, batch: Batch, run: int, at: NDArray[np.int64], steps: int, centre: Mapping[str, float]
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """(T, 3) w, (T, 3, 3) covariance and (T,) NIS of a run."""
+    """Return (T, 3) w, (T, 3, 3) covariance and (T,) NIS of a run."""
     struct, knowledge = Struct("filter_given_t"), batch.knowledge
     given = struct.pointer
     given.kind, given.steps, given.period = getattr(lib, f"FILTER_{kind}"), steps, batch.period

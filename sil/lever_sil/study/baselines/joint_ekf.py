@@ -32,7 +32,7 @@ _SKIPPED = 1e6  # noise of a missing output is so many times what it is: it coun
 
 
 def joint_ekf(batch: Batch, at: NDArray[np.int64]) -> Estimates:
-    """Runs over the whole batch."""
+    """Run over the whole batch."""
     return followed("JOINT_EKF", batch, at, JointEkf)
 
 
@@ -54,7 +54,7 @@ class Joint:
         return self.covariance[:, :PARAMETERS, :PARAMETERS]
 
     def predict(self, k: int) -> tuple[Array, Array]:
-        """States (B, 2) at sample k + 1, and the covariance of [w; x] there; w stays."""
+        """Return states (B, 2) at sample k + 1, and the covariance of [w; x] there; w stays."""
         raise NotImplementedError
 
     def step(self, k: int) -> None:

@@ -49,7 +49,7 @@ class UnscentedTransform:
 
 
 def joint_ukf(batch: Batch, at: NDArray[np.int64]) -> Estimates:
-    """Runs over the whole batch."""
+    """Run over the whole batch."""
     transform = UnscentedTransform()
     mean, covariance = (float(weights[0]) for weights in transform.weights)
     centre = {"reach": transform.reach, "mean_weight": mean, "covariance_weight": covariance}

@@ -34,7 +34,7 @@ class Recursion(Protocol):
 
 
 def follow(recursion: Recursion, at: NDArray[np.int64]) -> Estimates:
-    """Steps from sample 0 to the last of `at`. A run that breaks down goes on as NaN and leaves the others alone."""
+    """Step from sample 0 to the last of `at`. A run that breaks down goes on as NaN and leaves the others alone."""
     shape = (len(recursion.w), len(at))
     w, covariance = np.empty((*shape, PARAMETERS)), np.empty((*shape, PARAMETERS, PARAMETERS))
     nis = np.empty(shape)
@@ -52,12 +52,12 @@ def follow(recursion: Recursion, at: NDArray[np.int64]) -> Estimates:
 
 
 def transposed(matrices: Array) -> Array:
-    """Each of the matrices (B, n, m) transposed."""
+    """Return each of the matrices (B, n, m) transposed."""
     return matrices.swapaxes(1, 2)
 
 
 def apply(matrices: Array, vectors: Array) -> Array:
-    """(B, n, m) times (B, m)."""
+    """Return (B, n, m) times (B, m)."""
     product: Array = (matrices @ vectors[:, :, np.newaxis])[:, :, 0]
     return product
 
@@ -98,7 +98,8 @@ class Slopes:
         self._x, self._w = offsets[:, :STATES], offsets[:, STATES:]
 
     def move(self, k: int, x: Array, w: Array) -> tuple[Array, Array, Array]:
-        """States (B, 2) at sample k + 1 of x (B, 2) at sample k with w (B, 3); dx⁺/dx (B, 2, 2), dx⁺/dw (B, 2, 3)."""
+        """Return states (B, 2) at sample k + 1 of x (B, 2) at sample k with w (B, 3); dx⁺/dx (B, 2, 2), dx⁺/dw (B,
+        2, 3)."""
         moved = self._batch.move(k, x[:, np.newaxis] + self._x, w[:, np.newaxis] + self._w)
         half = STATES + PARAMETERS + 1
         slopes = transposed((moved[:, 1:half] - moved[:, half:]) / (2.0 * DIFFERENCE))
@@ -106,26 +107,26 @@ class Slopes:
 
 
 def output_covariance(batch: Batch) -> Array:
-    """(2, 2) R of a sample."""
+    """Return (2, 2) R of a sample."""
     return np.diag(batch.knowledge.output_noise**2)
 
 
 def walk_covariance(batch: Batch) -> Array:
-    """(3, 3) of the random walk of w over one sample period."""
+    """Return (3, 3) of the random walk of w over one sample period."""
     return np.diag(batch.knowledge.walk_w**2) * batch.period
 
 
 def block_diagonal(first: Array, second: Array) -> Array:
-    """The matrix with the two blocks and zeros elsewhere."""
+    """Return the matrix with the two blocks and zeros elsewhere."""
     n, m = len(first), len(second)
     return np.block([[first, np.zeros((n, m))], [np.zeros((m, n)), second]])
 
 
 def repeated(matrix: Array, runs: int) -> Array:
-    """(B, …): the same for each run."""
+    """Return (B, …): the same for each run."""
     return np.repeat(matrix[np.newaxis], runs, axis=0)
 
 
 def no_innovation(runs: int) -> tuple[Array, Array]:
-    """What there is before the first update: NaN, of covariance I."""
+    """Return what there is before the first update: NaN, of covariance I."""
     return np.full((runs, OUTPUTS), np.nan), repeated(np.eye(OUTPUTS), runs)

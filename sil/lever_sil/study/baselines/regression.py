@@ -46,7 +46,8 @@ class Equations:
         return q, to_q @ np.diag(knowledge.sigma_w**2) @ to_q.T
 
     def estimates(self, at: NDArray[np.int64], knowledge: Knowledge, q: Array, covariance: Array | None) -> Estimates:
-        """What q (B, J + 1, 3) and its covariance (B, J + 1, 3, 3), from before the first equation on, say at `at`.
+        """Return what q (B, J + 1, 3) and its covariance (B, J + 1, 3, 3), from before the first equation on, say at
+        `at`.
 
         Where q means no parameters (a negative mass) the last one that did stands; where it is not finite, NaN.
         """
@@ -70,9 +71,9 @@ class Equations:
 
 
 def equations(batch: Batch, window: float, corner: float) -> Equations:
-    """One for each `window` [s], without what is slower than `corner` [Hz]; 0: nothing is slow.
+    """Return one for each `window` [s], without what is slower than `corner` [Hz]; 0: nothing is slow.
 
-    Raises LeverError for a model that is not linear in any coefficients.
+    Raise LeverError for a model that is not linear in any coefficients.
     """
     n = max(1, round(window / batch.period))
     of_samples = balance(batch)
@@ -89,7 +90,7 @@ def equations(batch: Batch, window: float, corner: float) -> Equations:
 
 
 def _means(values: Array, n: int) -> Array:
-    """Means (B, K - n + 1, m) of n samples each, the i-th over samples i to i + n - 1."""
+    """Return means (B, K - n + 1, m) of n samples each, the i-th over samples i to i + n - 1."""
     total = np.concatenate((np.zeros_like(values[:, :1]), np.cumsum(values, axis=1)), axis=1)
     means: Array = (total[:, n:] - total[:, :-n]) / n
     return means
@@ -107,7 +108,8 @@ def _high_pass(values: Array, corner: float, dt: float) -> Array:
 
 
 def _variance(batch: Batch, n: int) -> float:
-    """Of the difference of neighbouring means of n samples of theta_dot, by n dt: of white noise and a random walk."""
+    """Return the variance of the difference of neighbouring means of n samples of theta_dot, by n dt: of white noise
+    and a random walk."""
     white = 2.0 * float(batch.knowledge.output_noise[1]) ** 2 / n
     walk = batch.knowledge.process_noise**2 * batch.period * (2 * n**2 + 1) / (3 * n)
     return (white + walk) / (n * batch.period) ** 2

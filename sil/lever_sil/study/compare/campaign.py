@@ -75,7 +75,7 @@ class Task:
 
 
 def tasks(chosen: Iterable[str], names: Iterable[str] | None, plan: Plan) -> list[Task]:
-    """Those of the cases `chosen`, for the entrants `names` (None: all there are)."""
+    """Return those of the cases `chosen`, for the entrants `names` (None: all there are)."""
     wanted = None if names is None else set(names)
     selected = []
     for name in chosen:
@@ -87,7 +87,7 @@ def tasks(chosen: Iterable[str], names: Iterable[str] | None, plan: Plan) -> lis
 
 
 def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> Results:
-    """Does all tasks, in `jobs` processes. Interrupted, it leaves no process behind."""
+    """Do all tasks, in `jobs` processes. Interrupted, it leaves no process behind."""
     results = Results(todo[0].plan, {}, {})
     for done, (task, result) in enumerate(interrupts.in_processes(do, todo, jobs), 1):
         if isinstance(result, Outcome):
@@ -100,7 +100,7 @@ def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> Result
 
 
 def do(task: Task) -> tuple[Task, Outcome | References | None]:
-    """One task."""
+    """Return one task."""
     if task.entrant is not None and is_candidate(task.entrant):
         enter(task.entrant)  # in this process
     case = cases()[task.case]
@@ -121,13 +121,13 @@ def _batch(case: str, plan: Plan) -> Batch:
 
 
 def samples(case: Case, batch: Batch) -> NDArray[np.int64]:
-    """Indices of the samples at which estimates are looked at."""
+    """Return indices of the samples at which estimates are looked at."""
     step = max(1, round(case.every / batch.period))
     return np.arange(step, batch.samples, step, dtype=np.int64)
 
 
 def outcome(batch: Batch, estimates: Estimates, seconds: float) -> Outcome:
-    """Of what an estimator made of a batch."""
+    """Return the outcome of what an estimator made of a batch."""
     at = estimates.at
     with np.errstate(all="ignore"):  # of runs that broke down
         deviations = errors(batch, estimates)
@@ -140,7 +140,7 @@ def outcome(batch: Batch, estimates: Estimates, seconds: float) -> Outcome:
 
 
 def _stated(batch: Batch, estimates: Estimates, deviations: Array) -> tuple[Array | None, Array | None]:
-    """Variances (B, T, 5) and NEES of the parameters (B, T), where the estimator and the truth tell them."""
+    """Return variances (B, T, 5) and NEES of the parameters (B, T), where the estimator and the truth tell them."""
     if estimates.covariance is None or batch.truth.p is None:
         return None, None
     own = np.diagonal(estimates.covariance, axis1=-2, axis2=-1)

@@ -77,11 +77,11 @@ class Case(ABC):
 
     @abstractmethod
     def batch(self, plan: Plan) -> Batch:
-        """What estimators get."""
+        """Return what estimators get."""
 
     @abstractmethod
     def judged(self, time: Array, plan: Plan) -> BoolArray:
-        """(T,) at which of the times [s] errors count."""
+        """Return (T,) at which of the times [s] errors count."""
 
     @property
     def own_settings(self) -> Mapping[str, float]:
@@ -98,11 +98,11 @@ class Case(ABC):
         return None
 
     def references(self, batch: Batch, at: NDArray[np.int64], plan: Plan) -> References | None:
-        """What errors are held against; None where the truth is not drawn from the model."""
+        """Return what errors are held against; None where the truth is not drawn from the model."""
         return None
 
     def runs(self, plan: Plan) -> int:
-        """How many."""
+        """Return how many."""
         return plan.seeds
 
     def length(self, plan: Plan) -> float:
@@ -110,7 +110,7 @@ class Case(ABC):
         return self.duration if plan.duration is None else plan.duration
 
     def scaled(self, moment: float, plan: Plan) -> float:
-        """A moment of a run of the case's own duration [s], in one as long as the plan wants it."""
+        """Return a moment of a run of the case's own duration [s], in one as long as the plan wants it."""
         return moment * self.length(plan) / self.duration
 
 
@@ -235,7 +235,7 @@ class Paper(Case):
         return detrended(exact, defaults["trim_corner"], defaults["align_time"])
 
     def factors(self, batch: Batch, plan: Plan) -> Array | None:
-        """(K, 3) of the parameters of the runs; None where they are as drawn."""
+        """Return (K, 3) of the parameters of the runs; None where they are as drawn."""
         if (change := self.change(plan)) is None:
             return None
         return jump(batch.samples, round(change / batch.period), np.array(_JUMP[self.model]))
@@ -272,7 +272,7 @@ class Protocol(Paper):
         return super().factors(batch, plan)
 
     def high(self, time: Array, plan: Plan) -> BoolArray:
-        """(T,) at which of the times [s] the square wave is high."""
+        """Return (T,) at which of the times [s] the square wave is high."""
         halves = np.floor((time / self.scaled(1.0, plan) - 10.0) / 5.0 + 1e-9)
         high: BoolArray = (halves >= 0.0) & (halves % 2.0 == 0.0)
         return high
@@ -297,7 +297,7 @@ class Recorded(Case):
         return recorded(self.name, self.runs(plan), plan.seed, plan.duration)
 
     def runs(self, plan: Plan) -> int:
-        """A run over the bus takes seconds."""
+        """Return how many runs there are: fewer, as a run over the bus takes seconds."""
         return min(plan.seeds, _MOST_RECORDED)
 
     def judged(self, time: Array, plan: Plan) -> BoolArray:
@@ -307,7 +307,7 @@ class Recorded(Case):
         return judged
 
     def change(self, plan: Plan) -> float | None:
-        """The last one."""
+        """Return the last one."""
         jumps = [jump for jump in self._scenario.changes() if 0.0 < jump < self.length(plan)]
         return jumps[-1] if jumps else None
 
@@ -318,7 +318,7 @@ ON_REQUEST = ("paper", "wrong tuning", "protocol")
 
 @cache
 def cases() -> Mapping[str, Case]:
-    """All there are, by name."""
+    """Return all there are, by name."""
     return {
         case.name: case
         for case in (*_matched(), *_steps(), *_wrong_noise(), *_wrong_tuning(), *_paper(), *_protocols(), *_recorded())

@@ -39,13 +39,13 @@ def linearised(rows: Sequence[Row], model: str, preload: str) -> Figure | None:
 
 
 def bound(rows: Sequence[Row], model: str, preload: str) -> Figure | None:
-    """The same ÷ posterior Cramér–Rao bound."""
+    """Return the same ÷ posterior Cramér–Rao bound."""
     chosen = [row for row in _walks(rows, model, preload) if math.isfinite(_average(row.bound))]
     return _lanes(chosen, "error ÷ posterior Cramér–Rao bound", lambda row: _average(row.bound), lambda _: 0.0, 1.0)
 
 
 def nees(rows: Sequence[Row], model: str) -> Figure | None:
-    """Mean NEES of each estimator in the matched cases of a model, preload fixed, with its 95 % band."""
+    """Return mean NEES of each estimator in the matched cases of a model, preload fixed, with its 95 % band."""
     chosen = [row for row in _walks(rows, model, "fixed") if math.isfinite(row.nees)]
     figure = _lanes(chosen, "NEES", lambda row: row.nees, lambda _: 0.0, 3.0)
     if figure is not None:
@@ -54,7 +54,7 @@ def nees(rows: Sequence[Row], model: str) -> Figure | None:
 
 
 def _walks(rows: Sequence[Row], model: str, preload: str) -> list[Row]:
-    """Of matched cases."""
+    """Return the walks of matched cases."""
     return [
         row
         for row in rows
@@ -71,7 +71,7 @@ def _average(values: Sequence[float]) -> float:
 def _lanes(
     rows: Sequence[Row], title: str, value: Callable[[Row], float], error: Callable[[Row], float], mark: float
 ) -> Figure | None:
-    """A lane for each estimator, a symbol for each case, over a logarithmic axis with a line at `mark`."""
+    """Return a lane for each estimator, a symbol for each case, over a logarithmic axis with a line at `mark`."""
     if not rows:
         return None
     names = list(dict.fromkeys(row.estimator for row in rows))
@@ -94,7 +94,7 @@ def _colour(estimator: str) -> str:
 def _marks(
     values: Array, at: Array, estimators: Sequence[str], name: str, index: int, errors: Array | None = None
 ) -> list[Spec]:
-    """One for each estimator; and for the legend one without a place, as they have no common colour."""
+    """Return one for each estimator; and for the legend one without a place, as they have no common colour."""
     look: Spec = {"size": 8, "symbol": SYMBOLS[index % len(SYMBOLS)]}
     colours = [f"@{_colour(estimator)}" for estimator in estimators]
     more: Spec = {"marker": look | {"color": colours}, "hovertemplate": f"%{{x:.3g}}<extra>{name}</extra>"}
@@ -113,7 +113,7 @@ def _offset(index: int, count: int) -> float:
 
 
 def _figure(names: Sequence[str], title: str, series: int, **x_axis: Any) -> Figure:
-    """An empty figure with a lane for each name, the first on top."""
+    """Return an empty figure with a lane for each name, the first on top."""
     lanes: Spec = {
         "tickvals": list(range(len(names))),
         "ticktext": list(names),
@@ -133,7 +133,8 @@ def _vertical(at: float, colour: str = "mark") -> Spec:
 
 
 def settling(results: Results, case: str) -> Figure | None:
-    """Of each run, when the natural frequency was found for good; hollow at the right end: never."""
+    """Return the settling of each run, when the natural frequency was found for good; hollow at the right end:
+    never."""
     change, names = cases()[case].change(results.plan), _present(results, case)
     if change is None or not names:
         return None
@@ -152,7 +153,8 @@ def settling(results: Results, case: str) -> Figure | None:
 
 
 def following(results: Results, case: str) -> Figure | None:
-    """The error of the natural frequency about the step: median over runs, and of the first of ours the middle half."""
+    """Return the error of the natural frequency about the step: median over runs, and of the first of ours the
+    middle half."""
     change, names = cases()[case].change(results.plan), _present(results, case)
     if change is None or not names:
         return None

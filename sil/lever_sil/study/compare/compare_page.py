@@ -27,7 +27,7 @@ def build(
     claims: Sequence[Claim],
     tables: Mapping[str, Sequence[TableRow]],
 ) -> tuple[str, dict[str, Spec]]:
-    """The whole page, and its figures by name."""
+    """Return the whole page, and its figures by name."""
     plan = results.plan
     length = "" if plan.duration is None else f" of {plan.duration:g} s"
     page = Page(
@@ -141,7 +141,7 @@ def _wrong_noise(page: Page, rows: Sequence[Row]) -> None:
 
 
 def _table(lines: Sequence[TableRow]) -> str:
-    """Of estimators with a column for each, as they have more figures than a page is wide."""
+    """Return the table of estimators with a column for each, as they have more figures than a page is wide."""
     if not lines or "estimator" not in lines[0]:
         return _rows(lines)
     parts = (lines[first : first + _ESTIMATORS] for first in range(0, len(lines), _ESTIMATORS))

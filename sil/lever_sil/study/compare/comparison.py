@@ -61,7 +61,8 @@ Differences = dict[tuple[str, str], Difference]
 def differences(
     case: str, names: Sequence[str], statistic: Any, runs: int, reference: str | None = None
 ) -> Differences:
-    """Of each of `names` against the `reference`, or against the best; `statistic` (rows, axis) gives their logarithms.
+    """Return the differences of each of `names` against the `reference`, or against the best; `statistic` (rows, axis)
+    gives their logarithms.
 
     `rows` holds indices of drawn runs along `axis` (-1); the names come first in what is returned. None below
     LEAST_RUNS.
@@ -86,13 +87,14 @@ def differences(
 
 
 def _difference(more: float, error: float, runs: int, counted: float) -> Difference:
-    """`counted`: for how many comparisons it stands."""
+    """Return `counted`: for how many comparisons it stands."""
     t = abs(more) / error if error > 0.0 else (math.inf if more else 0.0)
     return Difference(more, error, runs, min(1.0, counted * 2.0 * float(stdtr(runs - 1, -t))))
 
 
 def of_errors(case: str, squares: Mapping[str, Array], reference: str | None = None) -> Differences:
-    """Of the geometric mean over quantities of rms errors; mean squares (B, n) of each run by name of estimator."""
+    """Return the of errors of the geometric mean over quantities of rms errors; mean squares (B, n) of each run by
+    name of estimator."""
     together = np.stack(list(squares.values()), axis=1)
 
     def logarithms(rows: Array, axis: int) -> Array:
@@ -102,7 +104,7 @@ def of_errors(case: str, squares: Mapping[str, Array], reference: str | None = N
 
 
 def of_times(case: str, times: Mapping[str, Array]) -> Differences:
-    """Of the median over runs of times (B,) [s] by name of estimator."""
+    """Return the of times of the median over runs of times (B,) [s] by name of estimator."""
     together = np.stack(list(times.values()), axis=1)
 
     def logarithms(rows: Array, axis: int) -> Array:
@@ -112,14 +114,14 @@ def of_times(case: str, times: Mapping[str, Array]) -> Differences:
 
 
 def corrected(*families: Differences) -> list[Differences]:
-    """The same with probabilities by Holm, over all comparisons of all families together."""
+    """Return the same with probabilities by Holm, over all comparisons of all families together."""
     raw = [one.probability for family in families for one in family.values()]
     adjusted = iter(holm(np.array(raw)).tolist())
     return [{key: replace(one, probability=next(adjusted)) for key, one in family.items()} for family in families]
 
 
 def holm(probabilities: Array) -> Array:
-    """(n,) probabilities that allow for n comparisons."""
+    """Return (n,) probabilities that allow for n comparisons."""
     order = np.argsort(probabilities)
     steps = probabilities[order] * np.arange(len(order), 0, -1)
     adjusted = np.empty_like(probabilities)

@@ -38,7 +38,7 @@ _TRUE = ("true_theta_rad", "true_theta_dot_rad_s", "true_natural_frequency_Hz", 
 
 
 def write(folder: Path, names: list[str], plan: Plan) -> Iterator[str]:
-    """Write the cases `names`; yields each when it is written. Raises LeverError."""
+    """Write the cases `names`; yields each when it is written. Raise LeverError."""
     require("files", "pyarrow")
     from pyarrow import parquet
 
@@ -64,13 +64,13 @@ def write(folder: Path, names: list[str], plan: Plan) -> Iterator[str]:
 
 
 def plan_of(folder: Path) -> tuple[Plan, list[str]]:
-    """Return the plan that the files in a folder were written by, and their cases. Raises LeverError."""
+    """Return the plan that the files in a folder were written by, and their cases. Raise LeverError."""
     index = _index(folder)
     return Plan(index["seeds"], index["duration_s"], index["seed"], str(folder)), list(index["cases"])
 
 
 def read(folder: Path, name: str) -> Batch:
-    """Return the batch of a case from its file. Raises LeverError, also where the file is not the one of the index."""
+    """Return the batch of a case from its file. Raise LeverError, also where the file is not the one of the index."""
     require("files", "pyarrow")
     import pyarrow
     from pyarrow import parquet
@@ -86,7 +86,7 @@ def read(folder: Path, name: str) -> Batch:
     runs = int(table["run"][-1].as_py()) + 1
 
     def columns(*names: str) -> Array:
-        """(B, K, n)"""
+        """Return (B, K, n)."""
         return np.stack([table[each].to_numpy().reshape(runs, -1) for each in names], axis=-1)
 
     kind = KINDS[known["model"]]
@@ -106,7 +106,7 @@ def read(folder: Path, name: str) -> Batch:
 
 
 def _known(case: Case, batch: Batch) -> dict[str, Any]:
-    """What an estimator may know beforehand, in numbers that survive JSON."""
+    """Return what an estimator may know beforehand, in numbers that survive JSON."""
     knowledge = {
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in asdict(batch.knowledge).items()

@@ -49,13 +49,13 @@ def is_candidate(name: str) -> bool:
 
 
 def enter(name: str) -> None:
-    """Let the class MODULE:CLASS take part in every case, in this process. Raises LeverError."""
+    """Let the class MODULE:CLASS take part in every case, in this process. Raise LeverError."""
     if name not in _CANDIDATES:
         _CANDIDATES[name] = Entrant(name, f"class {name}", False, _always(candidate(name)))
 
 
 def entrants(case: Case) -> dict[str, Entrant]:
-    """Those of a case, by name, ours first."""
+    """Return those of a case, by name, ours first."""
     if case.kind == "paper":
         chosen = _adaptations() + [each for each in _baselines(case) if each.name in _OF_THE_PAPER]
     elif case.kind == "protocol":
@@ -102,7 +102,7 @@ def _adaptations() -> list[Entrant]:
 
 
 def _with(estimator: str, settings: Mapping[str, float]) -> Callable[[Case], Estimator]:
-    """The shipped firmware but for `settings`."""
+    """Return the shipped firmware but for `settings`."""
     return lambda case: Firmware(case.model, case.preload, estimator, settings={**case.own_settings, **settings})
 
 
@@ -171,7 +171,7 @@ def tuning_name(wrong: Mapping[str, str]) -> str:
 
 
 def _wrongly_tuned() -> list[Entrant]:
-    """The shipped firmware; what leaves the range of its setting stays at the end of it."""
+    """Return the shipped firmware; what leaves the range of its setting stays at the end of it."""
 
     def maker(wrong: Mapping[str, str]) -> Callable[[Case], Estimator]:
         def make(case: Case) -> Estimator:

@@ -83,12 +83,12 @@ class Row:
 
 
 def quantities(case: Case) -> tuple[str, ...]:
-    """Names of what is estimated."""
+    """Return names of what is estimated."""
     return (*KINDS[case.model].parameters, "natural_frequency", "damping_ratio")
 
 
 def judge(results: Results) -> list[Row]:
-    """All rows, case by case in the order of the registry."""
+    """Return all rows, case by case in the order of the registry."""
     rows: list[Row] = []
     for case in cases().values():
         of_case = entrants(case)
@@ -131,7 +131,7 @@ def _row(case: Case, entrant: Entrant, results: Results) -> Row:
 
 
 def _intact(outcome: Outcome) -> BoolArray:
-    """(B,) whether a run never broke down."""
+    """Return (B,) whether a run never broke down."""
     dynamics = outcome.errors[..., PARAMETERS:]
     has_parameters = ~np.isnan(outcome.errors[..., :PARAMETERS]).all()
     values = outcome.errors if has_parameters else dynamics
@@ -167,7 +167,7 @@ def _with_references(row: Row, errors: Array, references: References, intact: Bo
 
 
 def _with_baseline(row: Row, rows: list[Row], results: Results) -> Row:
-    """One of ours beside the best baseline of each quantity."""
+    """Return one of ours beside the best baseline of each quantity."""
     others = [other for other in rows if other.case == row.case and not other.ours and other.ranked]
     if not (row.ours and row.ranked and others):
         return row
@@ -179,7 +179,7 @@ def _with_baseline(row: Row, rows: list[Row], results: Results) -> Row:
 
 
 def judged_errors(results: Results, case: str, estimator: str) -> Array:
-    """(B, T, 5) errors at the times that count."""
+    """Return (B, T, 5) errors at the times that count."""
     outcome = results.outcomes[case, estimator]
     return outcome.errors[:, cases()[case].judged(outcome.time, results.plan)]
 
@@ -203,7 +203,8 @@ def compare(results: Results, rows: list[Row]) -> tuple[Differences, Differences
 
 
 def _times(results: Results, case: str, names: list[str], change: float) -> Mapping[str, Array]:
-    """(B,) settling times [s]; never counts as the time that was left, at once as the time between two estimates."""
+    """Return (B,) settling times [s]; never counts as the time that was left, at once as the time between two
+    estimates."""
     by_name = {}
     for name in names:
         outcome = results.outcomes[case, name]
@@ -231,7 +232,7 @@ def _consistent(squares: Array | None, freedom: int, intact: BoolArray, judged: 
 
 
 def settled(outcome: Outcome, change: float) -> tuple[float, float]:
-    """Median and worst time [s] after `change` [s] until the frequency is within 5 % for good; inf: never."""
+    """Return median and worst time [s] after `change` [s] until the frequency is within 5 % for good; inf: never."""
     median, worst = median_and_worst(settling_times(outcome.errors[..., FREQUENCY], outcome.time - change))
     return (math.inf if math.isnan(median) else median), (math.inf if math.isnan(worst) else worst)
 

@@ -106,7 +106,7 @@ def _columns(figures: Figures) -> Iterator[Array]:
 
 
 def pair(values: Array) -> str | None:
-    """Median and greatest of the values, of negative ones without their sign; infinity stands for never."""
+    """Return median and greatest of the values, of negative ones without their sign; infinity stands for never."""
     if not len(values) or np.isnan(values).all():
         return None
     return " / ".join(_text(abs(float(value))) for value in (np.median(values), np.max(values)))

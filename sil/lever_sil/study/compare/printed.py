@@ -29,7 +29,7 @@ _SYMBOLS = {"square": "s", "diamond": "D", "triangle-up": "^", "cross": "P", "st
 
 
 def render(figure: Spec, name: str, kind: str, provenance: Provenance) -> bytes:
-    """The file, two columns of a journal wide."""
+    """Return the file, two columns of a journal wide."""
     from matplotlib.figure import Figure as Sheet
 
     with pictures.style():
@@ -109,7 +109,7 @@ def _mark(axes: Axes, trace: Spec, x: Array, y: Array, label: str | None) -> Non
 
 
 def _values(packed: Mapping[str, Any]) -> Array:
-    """What series.packed() has packed."""
+    """Return what series.packed() has packed."""
     return np.frombuffer(base64.b64decode(packed["bdata"]), "<f4").astype(np.float64)
 
 
@@ -118,7 +118,7 @@ def _colour(name: str) -> Colour:
 
 
 def files(figures: Mapping[str, Spec], provenance: Provenance) -> Iterator[tuple[str, bytes]]:
-    """Name and content of each."""
+    """Yield name and content of each."""
     for name, figure in figures.items():
         for kind in KINDS:
             yield f"{name}.{kind}", render(figure, name, kind, provenance)

@@ -79,7 +79,7 @@ def square_wave(results: Results) -> list[Row]:
 
 
 def accounted(batch: Batch, outcome: Outcome, judged: Array) -> Array:
-    """(B,) variance of the true theta that a simulation with the estimated parameters accounts for [%]."""
+    """Return (B,) variance of the true theta that a simulation with the estimated parameters accounts for [%]."""
     assert batch.truth.p is not None
     at = np.round(outcome.time / batch.period).astype(np.int64)
     w = batch.knowledge.scaled(batch.truth.p[:, at]) + outcome.errors[..., :PARAMETERS]
@@ -97,7 +97,7 @@ def _size(errors: Array) -> str:
 
 
 def _risen(case: Protocol, results: Results, outcome: Outcome) -> str:
-    """Time from a rise until the mean over runs and rises of the estimate has done REACHED of it [s]."""
+    """Return time from a rise until the mean over runs and rises of the estimate has done REACHED of it [s]."""
     high = case.high(outcome.time, results.plan)
     factor = np.where(high, SQUARE, 1.0)
     estimate = ((1.0 + outcome.relative[..., _STIFFNESS]) * factor).mean(axis=0)

@@ -21,7 +21,7 @@ _QUANTITIES = ("parameter_1", "parameter_2", "parameter_3", "natural_frequency",
 
 
 def tables(rows: Sequence[Row], claims: Sequence[Claim]) -> dict[str, list[TableRow]]:
-    """A table of each case, and one of the claims."""
+    """Return a table of each case, and one of the claims."""
     by_title: dict[str, list[TableRow]] = {}
     for name, group in groupby(rows, key=lambda row: row.case):
         lines = [_line(row) for row in group]
@@ -68,7 +68,7 @@ def _line(row: Row) -> dict[str, Cell]:
 
 
 def columns() -> list[str]:
-    """Of the CSV."""
+    """Return the columns of the CSV."""
     names = ["case", "kind", "model", "preload", "estimator", "title", "parameters"]
     for field in fields(Row):
         if field.name not in names:
@@ -77,7 +77,7 @@ def columns() -> list[str]:
 
 
 def csv_text(rows: Sequence[Row]) -> str:
-    """One line a row, with all digits; errors are fractions, NaN stands as `nan`."""
+    """Return one line a row, with all digits; errors are fractions, NaN stands as `nan`."""
     file = io.StringIO()
     writer = csv.DictWriter(file, columns(), lineterminator="\n")
     writer.writeheader()

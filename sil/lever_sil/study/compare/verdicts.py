@@ -22,12 +22,12 @@ NEAR = 1.03
 
 
 def verdicts(rows: Sequence[Row], errors: Differences, times: Differences) -> dict[str, str]:
-    """A few sentences on each case; differences as of evaluation.compare()."""
+    """Return a few sentences on each case; differences as of evaluation.compare()."""
     return {case: verdict(list(group), errors, times) for case, group in groupby(rows, key=lambda row: row.case)}
 
 
 def verdict(rows: Sequence[Row], errors: Differences, times: Differences) -> str:
-    """The sentences on one case."""
+    """Return the sentences on one case."""
     runs = rows[0].asked
     if runs < LEAST_RUNS:
         return " ".join((f"Too few runs for a verdict: {runs}, at least {LEAST_RUNS} are needed.", *_unranked(rows)))
@@ -53,7 +53,7 @@ def _winner(ranked: Sequence[Row], errors: Differences) -> str:
 
 
 def _size(row: Row) -> str:
-    """Its errors, as times those of the linearised filter where there is one."""
+    """Return its errors, as times those of the linearised filter where there is one."""
     times = [value for value in row.linearised if math.isfinite(value)]
     if times:
         mean = math.exp(math.fsum(map(math.log, times)) / len(times))
@@ -137,7 +137,7 @@ Value = tuple[float, str, float]
 
 
 def claims(rows: Sequence[Row]) -> list[Claim]:
-    """All of them, with what was measured."""
+    """Return all of them, with what was measured."""
     collected: list[Claim] = []
 
     def add(text: str, limit: float, values: Iterable[Value], below: bool = True) -> None:
@@ -208,14 +208,14 @@ def _place(row: Row) -> str:
 
 
 def _of(rows: Iterable[Row], value: Callable[[Row], float]) -> Iterator[Value]:
-    """A value of each row, with where it is from."""
+    """Return a value of each row, with where it is from."""
     return ((value(row), _place(row), math.nan) for row in rows)
 
 
 def _each(
     rows: Iterable[Row], values: Callable[[Row], Five], errors: Callable[[Row], Five] = lambda _: UNKNOWN
 ) -> Iterator[Value]:
-    """The values of each quantity of each row, with where they are from and their standard errors."""
+    """Yield the values of each quantity of each row, with where they are from and their standard errors."""
     for row in rows:
         for name, value, error in zip(quantities(cases()[row.case]), values(row), errors(row), strict=True):
             yield value, f"{_place(row)}, {name}", error

@@ -17,7 +17,7 @@ _LENGTH = 3.0  # durations of the other figures: a drift takes its time
 
 
 def bode(seed: int, extent: Extent) -> Figure:
-    """Magnitude of θ/z̈ over time and frequency while the pilot drifts, truth and estimate."""
+    """Return magnitude of θ/z̈ over time and frequency while the pilot drifts, truth and estimate."""
     condition = Condition("lever", "fixed", settings={**PRIOR, **_DRIFT})
     batch = matched(condition, 1, _LENGTH * extent.duration, seed)
     at = shown(batch)
@@ -38,7 +38,7 @@ def bode(seed: int, extent: Extent) -> Figure:
 
 
 def _surface(lever: Lever, time: Array, p: Array, natural_frequency: Array, period: float) -> Surface:
-    """Of parameters (T, 3), about the angle at which they hold the lever."""
+    """Return the surface of parameters (T, 3), about the angle at which they hold the lever."""
     angle = rest_angle(lever, p.T, np.zeros(len(p)), period)
     magnitude = np.degrees(np.abs(transfer("lever", lever, p.T, angle).response(FREQUENCIES)))
     there = [np.interp(*at) for at in zip(natural_frequency, [FREQUENCIES] * len(p), magnitude, strict=True)]

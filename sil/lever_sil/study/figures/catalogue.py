@@ -36,5 +36,5 @@ def chosen(names: Sequence[str], known: Sequence[str]) -> list[str]:
 
 
 def summary(name: str) -> str:
-    """The figure in a line."""
+    """Return the figure in a line."""
     return (FIGURES[name].__doc__ or "").splitlines()[0]

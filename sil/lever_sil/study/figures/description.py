@@ -138,12 +138,13 @@ class Figure:
     """[inches] in print."""
 
     def brightest(self) -> float:
-        """Greatest magnitude of all surfaces, which share one scale."""
+        """Return greatest magnitude of all surfaces, which share one scale."""
         surfaces = [column.content for column in self.columns if isinstance(column.content, Surface)]
         return max(float(np.nanmax(surface.magnitude)) for surface in surfaces)
 
     def limits(self) -> list[tuple[float, float]]:
-        """Of the y axes, row by row: what any column says, or all that is drawn from `scaled_from` on, and a margin."""
+        """Return the limits of the y axes, row by row: what any column says, or all that is drawn from `scaled_from`
+        on, and a margin."""
         columns = [column.content for column in self.columns if not isinstance(column.content, Surface)]
         since = max(self.x_range[0], self.scaled_from)
         return [rows[0].limits or _limits(rows, since) for rows in zip(*columns, strict=True)]
@@ -172,5 +173,5 @@ def number(value: float, digits: int = 2) -> str:
 
 
 def percent(share: float, digits: int = 2) -> str:
-    """A part of 1, in percent."""
+    """Return a part of 1, in percent."""
     return f"{number(100.0 * share, digits)} %"

@@ -24,7 +24,7 @@ _LIFT = 1.01  # of a curve over the surface that it follows
 
 
 def build(figures: Sequence[Figure | MapFigure]) -> str:
-    """The page; each figure can be linked to by its name, as in figures.html#bode."""
+    """Return the page; each figure can be linked to by its name, as in figures.html#bode."""
     page = Page(
         "Figures",
         "Simulated runs of the firmware. Errors, times and shares in the captions are measured in these runs.",
@@ -38,7 +38,7 @@ def build(figures: Sequence[Figure | MapFigure]) -> str:
 
 
 def _charts(page: Page, figure: Figure | MapFigure) -> str:
-    """Side by side where there is room for them."""
+    """Return side by side where there is room for them."""
     if isinstance(figure, MapFigure):
         return page.figure(f"{figure.name}-0", maps.spec(figure), "")
     charts = [
@@ -85,7 +85,7 @@ def _traces(trace: Trace, row: int) -> list[chart.Spec]:
 
 
 def _surface(surface: Surface, title: str, brightest: float) -> chart.Spec:
-    """A surface that can be turned, with a curve on it; `brightest` is the end of the scale of all of them."""
+    """Return a surface that can be turned, with a curve on it; `brightest` is the end of the scale of all of them."""
     look: chart.Spec = {"backgroundcolor": "rgba(0,0,0,0)", "gridcolor": "@edge", "zerolinecolor": "@edge"}
     look |= {"color": "@text", "tickfont": _SCENE_FONT}
     shown = {
@@ -125,6 +125,6 @@ def _surface(surface: Surface, title: str, brightest: float) -> chart.Spec:
 
 
 def _heights(greatest: float) -> chart.Spec:
-    """An axis from 0 to `greatest` without a label at 0, which would lie on those of the other axes."""
+    """Return an axis from 0 to `greatest` without a label at 0, which would lie on those of the other axes."""
     step = 10.0 ** math.floor(math.log10(greatest))
     return {"range": [0.0, greatest], "tickvals": [step * count for count in range(1, int(greatest / step) + 1)]}

@@ -33,7 +33,7 @@ class _Case:
 
 
 def identification(seed: int, extent: Extent) -> Figure:
-    """Parameters and dynamics of one pilot, dual and joint filter, without and with dither, and a reference."""
+    """Return parameters and dynamics of one pilot, dual and joint filter, without and with dither, and a reference."""
     cases = {title: _case(seed, extent, dither) for title, dither in _CASES.items()}
     columns = tuple(
         Column(title, tuple(Row(label, _traces(case, index)) for index, label in enumerate(_LABELS)))
@@ -96,7 +96,7 @@ def _caption(cases: dict[str, _Case], settled: float) -> str:
 
 
 def _claimed(case: _Case) -> Array:
-    """(5,) relative σ of the dual filter at the end."""
+    """Return (5,) relative σ of the dual filter at the end."""
     value, sigma = case.estimates["dual"]
     last: Array = sigma[-1] / value[-1]
     return last

@@ -34,7 +34,7 @@ _MILLI = 1e3
 
 
 def excitation(seed: int, extent: Extent) -> Figure:
-    """Inputs and outputs of a linear system with process noise, and what it does without that noise."""
+    """Return inputs and outputs of a linear system with process noise, and what it does without that noise."""
     batch = matched(_NOISY, 1, extent.duration, seed)
     silent = dataclasses.replace(_NOISY, settings={**_NOISY.settings, "theta_dot_process_noise": 0.0})
     quiet = matched(silent, 1, extent.duration, seed)  # the same inputs, parameters and output noise
@@ -73,7 +73,7 @@ def _excitation_caption(batch: Batch, quiet: Batch) -> str:
 
 
 def states(seed: int, extent: Extent) -> Figure:
-    """States of a linear system with process noise as the firmware reconstructs them, and its errors."""
+    """Return states of a linear system with process noise as the firmware reconstructs them, and its errors."""
     batch = matched(_NOISY, 1, extent.duration, seed)
     estimated = estimates(matched_config(_NOISY, "dual"), batch)
     time, window = _excerpt(batch)
@@ -121,7 +121,7 @@ def _state_rows(
 
 
 def parameters(seed: int, extent: Extent) -> Figure:
-    """Parameters of both linear models as the firmware reconstructs them."""
+    """Return parameters of both linear models as the firmware reconstructs them."""
     parts = [part for condition in _CONDITIONS for part in _parameters(condition, seed, extent)]
     caption = (
         "Parameters of the linear physical model (m, c, k; shaken by its base and by a force of "
@@ -138,7 +138,7 @@ def parameters(seed: int, extent: Extent) -> Figure:
 
 
 def _parameters(condition: Condition, seed: int, extent: Extent) -> list[tuple[Row, str]]:
-    """A chart of each parameter of one model, and what there is to say of it."""
+    """Return a chart of each parameter of one model, and what there is to say of it."""
     batch = matched(condition, 1, extent.duration, seed)
     at = shown(batch)
     time, settled = at * batch.period, late(at.astype(np.float64))
@@ -167,7 +167,7 @@ def _tracked(time: Array, truth: Array, estimate: Array, sigma: Array) -> tuple[
 
 
 def _excerpt(batch: Batch) -> tuple[Array, NDArray[np.int64]]:
-    """Times [s] and indices of the samples at the end of a run."""
+    """Return times [s] and indices of the samples at the end of a run."""
     window = np.arange(max(0, batch.samples - round(_EXCERPT / batch.period)), batch.samples, dtype=np.int64)
     return window * batch.period, window
 

@@ -65,15 +65,15 @@ class Scale:
         return np.concatenate(([2.0 * at[0] - middle[0]], middle, [2.0 * at[-1] - middle[-1]]))
 
     def ticks(self, most: int) -> list[int]:
-        """Indices of values that are written at the axis, both ends among them."""
+        """Return indices of values that are written at the axis, both ends among them."""
         return sorted({round(at) for at in np.linspace(0.0, len(self.values) - 1.0, most)})
 
     def value(self, position: float) -> float:
-        """What is at a position; infinities stay."""
+        """Return what is at a position; infinities stay."""
         return float(np.exp(position)) if self.is_log else position
 
     def place(self, values: Array) -> Array:
-        """Positions of values; what is beyond the scale is at its edge."""
+        """Return positions of values; what is beyond the scale is at its edge."""
         with np.errstate(divide="ignore", invalid="ignore"):
             positions = np.log(np.maximum(values, 0.0)) if self.is_log else values
         clipped: Array = np.clip(positions, *np.sort(self.position[[0, -1]]))
@@ -124,7 +124,7 @@ class MapFigure:
 
 
 def written(value: float | str) -> str:
-    """A value of a scale."""
+    """Return a value of a scale."""
     return value if isinstance(value, str) else f"{value:.2g}"
 
 
@@ -132,7 +132,7 @@ def written(value: float | str) -> str:
 
 
 def sheet(figure: MapFigure, width: str = "single") -> Sheet:
-    """The figure laid out by matplotlib."""
+    """Return the figure laid out by matplotlib."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Sheet
 
@@ -164,7 +164,7 @@ def sheet(figure: MapFigure, width: str = "single") -> Sheet:
 
 
 def _draw(place: Axes, figure: MapFigure, chart: Chart) -> Any:
-    """Returns the colours, for their bar."""
+    """Return the colours, for their bar."""
     low, high = figure.limits
     colours = place.pcolormesh(
         figure.x.edges,
@@ -257,7 +257,7 @@ def _heat(figure: MapFigure, values: Array, *, with_bar: bool) -> Spec:
 
 
 def _line(figure: MapFigure, line: Line | None) -> list[Spec]:
-    """The line and its band."""
+    """Return the line and its band."""
     if line is None:
         return []
     y = _places(figure.y)[list(line.rows)].tolist()

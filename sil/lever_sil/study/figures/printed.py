@@ -25,12 +25,12 @@ _LEVELS = 18  # of a contour, at most
 def render(
     figure: Figure | MapFigure, kind: str = "png", width: str = "single", provenance: Provenance | None = None
 ) -> bytes:
-    """The file, of pictures.KINDS, in one of pictures.WIDTHS; the same figure gives the same bytes."""
+    """Return the file, of pictures.KINDS, in one of pictures.WIDTHS; the same figure gives the same bytes."""
     return pictures.render(sheet(figure, width), kind, figure.title, provenance)
 
 
 def sheet(figure: Figure | MapFigure, width: str = "single") -> Sheet:
-    """The figure laid out by matplotlib."""
+    """Return the figure laid out by matplotlib."""
     if isinstance(figure, MapFigure):
         return maps.sheet(figure, width)
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -51,7 +51,7 @@ def sheet(figure: Figure | MapFigure, width: str = "single") -> Sheet:
 
 
 def _draw_surfaces(sheet: Sheet, figure: Figure, surfaces: list[tuple[str, Surface]]) -> None:
-    """Filled contours of one scale, side by side."""
+    """Draw filled contours of one scale, side by side."""
     from matplotlib.ticker import MaxNLocator
 
     sheet.set_figheight(figure.row_height + _HEADROOM)

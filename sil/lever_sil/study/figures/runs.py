@@ -36,20 +36,20 @@ class Extent:
 
 
 def matched_config(condition: Condition, estimator: str) -> Config:
-    """What the firmware is told of a matched run with preload fixed."""
+    """Return what the firmware is told of a matched run with preload fixed."""
     settings = {**condition.settings, **MATCHED}
     return Config(condition.model, condition.preload, estimator, "fixed", settings=settings)
 
 
 def shown(batch: Batch) -> NDArray[np.int64]:
-    """Samples at which curves over a whole run are drawn; the first and the last are among them."""
+    """Return samples at which curves over a whole run are drawn; the first and the last are among them."""
     return spread_indices(batch.samples, _POINTS).astype(np.int64)
 
 
 def estimates(
     config: Config, batch: Batch, run: int = 0, at: NDArray[np.int64] | None = None
 ) -> dict[str, NDArray[np.float64]]:
-    """Columns of lever_estimate_t after the samples `at` (all without it) of one run, by the firmware."""
+    """Return columns of lever_estimate_t after the samples `at` (all without it) of one run, by the firmware."""
     y, u = batch.raw_y[run], batch.raw_u[run]
     time_us = np.arange(batch.samples, dtype=np.int64) * round(batch.period * 1e6)
     samples = {"time_us": time_us, "theta": y[:, 0], "theta_dot": y[:, 1], "z_ddot": u[:, 0], "tau_m": u[:, 1]}
@@ -57,16 +57,16 @@ def estimates(
 
 
 def late(time: Array) -> NDArray[np.bool_]:
-    """The second half of a run, in which an estimator has found its way."""
+    """Return the second half of a run, in which an estimator has found its way."""
     second: NDArray[np.bool_] = time >= 0.5 * (time[0] + time[-1])
     return second
 
 
 def rms(values: Array) -> float:
-    """Root mean square."""
+    """Return root mean square."""
     return float(np.sqrt(np.mean(np.square(values))))
 
 
 def held(truth: Array, estimate: Array, sigma: Array) -> float:
-    """Share of values of the truth within estimate ± 2 sigma; about 0.95 if sigma is right."""
+    """Return share of values of the truth within estimate ± 2 sigma; about 0.95 if sigma is right."""
     return float(np.mean(np.abs(truth - estimate) <= 2.0 * sigma))

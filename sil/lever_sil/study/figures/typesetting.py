@@ -30,18 +30,18 @@ def in_mathtext(text: str) -> str:
 
 
 def own_css() -> str:
-    """The style of the page beyond that of a report."""
+    """Return the style of the page beyond that of a report."""
     return (files(__package__) / "figures.css").read_text(encoding="utf-8")
 
 
 def css() -> str:
-    """The whole style of the page."""
+    """Return the whole style of the page."""
     return (files("lever_cdkf.report") / "page.css").read_text(encoding="utf-8") + own_css()
 
 
 @cache
 def colours() -> Mapping[str, Colour]:
-    """The colours of the light theme by name."""
+    """Return the colours of the light theme by name."""
     light = re.sub(r"@media[^{]*dark[^{]*\{\s*:root[^{]*\{[^}]*\}\s*\}", "", css())
     return {name: _colour(value) for name, value in _COLOUR.findall(light) if value.startswith(("#", "rgba"))}
 

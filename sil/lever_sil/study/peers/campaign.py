@@ -45,18 +45,18 @@ class Task:
 
 
 def figures(condition: Condition) -> tuple[str, str]:
-    """Which figures of `lever envelope` are compared."""
+    """Return which figures of `lever envelope` are compared."""
     of = "f_n" if condition.motion.pilot == "arm" else "θ/z̈"
     return f"{of} rms", f"{of} covered"
 
 
 def tasks(chosen: Iterable[Condition], seeds: int, estimators: Sequence[str]) -> list[Task]:
-    """All there is to do."""
+    """Return all there is to do."""
     return [Task(tuple(one.name for one in chunk), seeds, tuple(estimators)) for chunk in chunks(chosen, seeds)]
 
 
 def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> list[Result]:
-    """Does all tasks, in `jobs` processes. Interrupted, it leaves no process behind."""
+    """Do all tasks, in `jobs` processes. Interrupted, it leaves no process behind."""
     total, done = sum(len(task.conditions) for task in todo), 0
     collected: list[Result] = []
     for task, results in interrupts.in_processes(do, todo, jobs):
@@ -69,7 +69,7 @@ def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> list[R
 
 
 def do(task: Task) -> tuple[Task, list[Result]]:
-    """One task."""
+    """Return one task."""
     ready = list(logs([conditions.CONDITIONS[name] for name in task.conditions], task.seeds))
     results = []
     for name in task.estimators:

@@ -50,7 +50,8 @@ PEERS = {
 
 
 def tracks(logs: Sequence[Log], peer: Peer) -> list[Track]:
-    """What a peer says of each log, all of one chunk, at every STRIDE-th sample; NaN from where it breaks down."""
+    """Return what a peer says of each log, all of one chunk, at every STRIDE-th sample; NaN from where it breaks
+    down."""
     batch = _batch(logs, peer.high_pass)
     at = np.arange(0, batch.samples, STRIDE, dtype=np.int64)
     whole = _track(batch, follow(peer.filter(batch), at))
@@ -59,7 +60,8 @@ def tracks(logs: Sequence[Log], peer: Peer) -> list[Track]:
 
 
 def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
-    """Of all logs side by side. Samples come first in memory, since filters go through them one by one."""
+    """Return the batch of all logs side by side. Samples come first in memory, since filters go through them one by
+    one."""
     settings = {row.name: row.default for row in settings_table()}
     signals = np.stack([np.concatenate([log.signals[name] for log in logs], axis=1) for name in _SIGNALS], axis=-1)
     trim = np.broadcast_to(np.concatenate([log.trim for log in logs]), signals.shape[:2])
@@ -85,7 +87,7 @@ def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
 
 
 def held(signals: Array) -> Array:
-    """Signals (samples, …) with the last valid value in place of NaN; 0 before the first."""
+    """Return signals (samples, …) with the last valid value in place of NaN; 0 before the first."""
     index = np.arange(len(signals)).reshape(-1, *(1,) * (signals.ndim - 1))
     last = np.maximum.accumulate(np.where(np.isnan(signals), 0, index), axis=0)
     values: Array = np.nan_to_num(np.take_along_axis(signals, last, axis=0), nan=0.0)
@@ -93,7 +95,8 @@ def held(signals: Array) -> Array:
 
 
 def high_pass(signals: Array, corner: float, start: Array) -> Array:
-    """Signals (samples, …) without what is slower than `corner` [Hz]; they have rested at `start` (…) for ever."""
+    """Return signals (samples, …) without what is slower than `corner` [Hz]; they have rested at `start` (…) for
+    ever."""
     sections = np.vstack([butter(2, corner, "highpass", fs=1.0 / PERIOD, output="sos")] * 2)
     return _filtered(sections, signals, start)
 

@@ -35,7 +35,7 @@ class Log:
 
 
 def chunks(conditions: Iterable[Condition], seeds: int) -> list[list[Condition]]:
-    """Conditions that are filtered together: as long, with the same process noise, at most LANES runs."""
+    """Return conditions that are filtered together: as long, with the same process noise, at most LANES runs."""
     by_kind: dict[tuple[object, ...], list[list[Condition]]] = {}
     for condition in conditions:
         motion = condition.motion
@@ -48,7 +48,7 @@ def chunks(conditions: Iterable[Condition], seeds: int) -> list[list[Condition]]
 
 
 def logs(chunk: Sequence[Condition], seeds: int) -> Iterator[Log]:
-    """The logs of a chunk; equal motions are simulated once."""
+    """Yield the logs of a chunk; equal motions are simulated once."""
     recordings = _recordings({_key(condition) for condition in chunk if condition.closed_loop is None}, seeds)
     for condition in chunk:
         own = range(seeds * condition.runs)
@@ -75,7 +75,7 @@ def _key(condition: Condition) -> _Key:
 
 
 def _recordings(keys: Iterable[_Key], seeds: int) -> dict[_Key, Recording]:
-    """All recordings of a chunk: arms are simulated side by side, other pilots one by one."""
+    """Return all recordings of a chunk: arms are simulated side by side, other pilots one by one."""
     recordings = {key: pilots.record(key.motion, range(seeds * key.runs)) for key in keys if key.motion.pilot != "arm"}
     given = {key: lanes(key.motion, range(seeds * key.runs)) for key in keys if key.motion.pilot == "arm"}
     if not given:
@@ -98,7 +98,7 @@ def _firmware(condition: Condition, signals: Mapping[str, Array], response: bool
 
 
 def _closed_loop(condition: Condition, loop: ClosedLoop, seeds: Sequence[int], trim: Array) -> Log:
-    """The firmware dithers by itself, so that its log is part of its run; what was lost is drawn as there."""
+    """Return the firmware dithers by itself, so that its log is part of its run; what was lost is drawn as there."""
     config = Config(settings=condition.settings)
     recording, track = firmware.closed_loop(config, condition.motion, seeds, loop, lambda: None)
     signals = measured(recording, Sensors(), seeds)

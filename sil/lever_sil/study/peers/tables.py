@@ -15,7 +15,7 @@ from .filters import PEERS
 
 
 def tables(results: Sequence[Result], seeds: int) -> dict[str, list[Row]]:
-    """Median and worst run of each estimator in each condition: errors, and coverage."""
+    """Return median and worst run of each estimator in each condition: errors, and coverage."""
     of = f"median / worst of {seeds} pilots or more"
     return {
         f"rms error of f_n (θ/z̈ of other pilots) [%], {of}": _table(results, "rms"),
@@ -33,7 +33,7 @@ def _table(results: Sequence[Result], what: str) -> list[Row]:
 
 
 def _two(result: Result, what: str) -> tuple[float, float]:
-    """Median and worst."""
+    """Return median and worst."""
     values = result.rms if what == "rms" else result.covered
     return float(np.median(values)), float(values.max() if what == "rms" else values.min())
 
@@ -43,7 +43,7 @@ def _text(value: float) -> str:
 
 
 def rows(results: Sequence[Result]) -> list[Row]:
-    """A row for each estimator in each condition, with numbers."""
+    """Return a row for each estimator in each condition, with numbers."""
     table: list[Row] = []
     for result in results:
         (rms, worst), (covered, least) = _two(result, "rms"), _two(result, "covered")
@@ -62,7 +62,8 @@ def rows(results: Sequence[Result]) -> list[Row]:
 
 
 def differences(results: Sequence[Result]) -> Differences:
-    """Of the peers' errors against the firmware's in each condition; without those that broke down in a run."""
+    """Return the differences of the peers' errors against the firmware's in each condition; without those that broke
+    down in a run."""
     compared: Differences = {}
     for condition, group in groupby(results, key=lambda result: result.condition):
         squares = {one.estimator: np.square(one.rms)[:, np.newaxis] for one in group if np.isfinite(one.rms).all()}
@@ -72,7 +73,7 @@ def differences(results: Sequence[Result]) -> Differences:
 
 
 def verdicts(results: Sequence[Result]) -> Iterator[str]:
-    """A sentence on the firmware against each peer."""
+    """Yield a sentence on the firmware against each peer."""
     if any(len(result.rms) < LEAST_RUNS for result in results):
         yield f"Too few runs for a verdict: at least {LEAST_RUNS} are needed."
         return
