@@ -83,7 +83,7 @@ def crc_of_run(estimator: int, frames: list[tuple[int, bytes]]) -> int:
 
 
 def header() -> str:
-    """The text of golden.h."""
+    """Return the text of golden.h."""
     frames = input_frames()
     crcs = [crc_of_run(estimator, frames) for estimator in enum_names("lever_estimator")]
     return _HEAD.format(

@@ -17,7 +17,7 @@ _LENGTH = 3.0  # durations of the other figures: a drift takes its time
 
 
 def bode(seed: int, extent: Extent) -> Figure:
-    """Return magnitude of θ/z̈ over time and frequency while the pilot drifts, truth and estimate."""
+    """Draw magnitude of θ/z̈ over time and frequency while the pilot drifts, truth and estimate."""
     condition = Condition("lever", "fixed", settings={**PRIOR, **_DRIFT})
     batch = matched(condition, 1, _LENGTH * extent.duration, seed)
     at = shown(batch)

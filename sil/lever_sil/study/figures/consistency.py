@@ -19,7 +19,7 @@ _ESTIMATORS = {"dual": "estimate", "joint": "joint"}  # and their looks
 
 
 def nees(seed: int, extent: Extent) -> Figure:
-    """Return mean NEES of many runs over time, dual and joint, without and with dither, in its 95 % band."""
+    """Draw mean NEES of many runs over time, dual and joint, without and with dither, in its 95 % band."""
     drawn: dict[str, tuple[Trace, ...]] = {}
     sentences: list[str] = []
     for case, dither in _CASES.items():

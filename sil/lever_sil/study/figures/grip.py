@@ -37,7 +37,7 @@ class _Case:
 
 
 def grip(seed: int, extent: Extent) -> Figure:
-    """Return a grip that tightens at once, followed with and without detection of changes."""
+    """Draw a grip that tightens at once, followed with and without detection of changes."""
     condition = Condition("lever", "trim", dither_rms=DITHER, settings=PRIOR)
     calm = matched(condition, extent.runs, extent.duration, seed)
     moment = calm.samples // 2

@@ -33,7 +33,7 @@ class _Case:
 
 
 def identification(seed: int, extent: Extent) -> Figure:
-    """Return parameters and dynamics of one pilot, dual and joint filter, without and with dither, and a reference."""
+    """Draw parameters and dynamics of one pilot, dual and joint filter, without and with dither, and a reference."""
     cases = {title: _case(seed, extent, dither) for title, dither in _CASES.items()}
     columns = tuple(
         Column(title, tuple(Row(label, _traces(case, index)) for index, label in enumerate(_LABELS)))

@@ -34,7 +34,7 @@ _MILLI = 1e3
 
 
 def excitation(seed: int, extent: Extent) -> Figure:
-    """Return inputs and outputs of a linear system with process noise, and what it does without that noise."""
+    """Draw inputs and outputs of a linear system with process noise, and what it does without that noise."""
     batch = matched(_NOISY, 1, extent.duration, seed)
     silent = dataclasses.replace(_NOISY, settings={**_NOISY.settings, "theta_dot_process_noise": 0.0})
     quiet = matched(silent, 1, extent.duration, seed)  # the same inputs, parameters and output noise
@@ -73,7 +73,7 @@ def _excitation_caption(batch: Batch, quiet: Batch) -> str:
 
 
 def states(seed: int, extent: Extent) -> Figure:
-    """Return states of a linear system with process noise as the firmware reconstructs them, and its errors."""
+    """Draw states of a linear system with process noise as the firmware reconstructs them, and its errors."""
     batch = matched(_NOISY, 1, extent.duration, seed)
     estimated = estimates(matched_config(_NOISY, "dual"), batch)
     time, window = _excerpt(batch)
@@ -121,7 +121,7 @@ def _state_rows(
 
 
 def parameters(seed: int, extent: Extent) -> Figure:
-    """Return parameters of both linear models as the firmware reconstructs them."""
+    """Draw parameters of both linear models as the firmware reconstructs them."""
     parts = [part for condition in _CONDITIONS for part in _parameters(condition, seed, extent)]
     caption = (
         "Parameters of the linear physical model (m, c, k; shaken by its base and by a force of "
