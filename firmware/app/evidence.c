@@ -179,12 +179,14 @@ static void judge_motor(evidence_t *evidence, float period, float sample_period)
     (void)evidence_set(evidence, EVIDENCE_MOTOR, away);
 }
 
-/* A change of an arm that was known has to explain the innovations within its probation; otherwise noise has grown. */
+/* A change of an arm that was known has to explain the innovations within its probation; otherwise noise has grown, where
+ * that is estimated: without an estimate nothing would end it. */
 static void judge_noise(evidence_t *evidence, const evidence_block_t *block)
 {
     const float since = evidence->since_change;
-    const bool tests = block->known && (block->verdict != (uint8_t)VERDICT_REGRIP) && (since <= PROBATION);
-    const bool ends = block->known && (since > PROBATION) && (since < (PROBATION + (1.01f * block->period)));
+    const bool judged = block->known && (block->setup->settings->noise_window > 0.0f);
+    const bool tests = judged && (block->verdict != (uint8_t)VERDICT_REGRIP) && (since <= PROBATION);
+    const bool ends = judged && (since > PROBATION) && (since < (PROBATION + (1.01f * block->period)));
     if (ends) {
         (void)evidence_set(evidence, EVIDENCE_NOISE, (1.0f / EXPLAINED) * evidence->nis_fast);
     } else if (tests || evidence_has(evidence, EVIDENCE_NOISE)) {

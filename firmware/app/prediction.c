@@ -10,7 +10,7 @@
 #define UNSETTLED 4.0f    /* innovations while levels settle, in squares: as much larger as they may be */
 #define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
 #define RATE_MOST 1.0e4f  /* [rad/s] */
-#define REST_RATE 1.0f    /* of the mean of the trim angle, which itself follows motion of 1 to 3 Hz in full [1/s] */
+#define REST_RATE 6.0f    /* of the mean of the trim angle, which itself follows motion of 1 to 3 Hz in full [1/s] */
 #define SUBSTEPS_MOST 12u /* predictions through a gap: bounds the time of one call */
 
 /* Torque of one newton metre of Coulomb friction, smooth about standstill. Of a rate that is none it is none: what is

@@ -167,7 +167,7 @@ class Learning:
         """Return whether a change of a known arm has not explained the innovations, or they are still too large."""
         if self.verdict == "noise":
             return mean_square > EXPLAINED
-        known = self.kept[1].trust >= 1.0
+        known = self.kept[1].trust >= 1.0 and self.settings["noise_window"] > 0.0
         if known and self.since_change <= seconds(PROBATION):
             return self.verdict != "regrip" and mean_square > UNEXPLAINED[0]
         ends = self.since_change < PROBATION + 1.01 * period

@@ -12,6 +12,7 @@ from lever_cdkf.models.detrend import Detrend
 from numpy.typing import NDArray
 from oracle import Estimator, Lever, Start, cdkf
 from oracle.change import ChangeDetection
+from oracle.learning import seconds
 from scipy.signal import butter, freqs
 
 Array = NDArray[Any]  # of floats
@@ -77,7 +78,8 @@ def test_it_is_the_joint_filter(form: str, share: float) -> None:
     samples = recorded(700, PILOT * [1.2, 0.8, 1.1])
     estimator = Estimator(EACH_SAMPLE, start_of(samples), "fixed", "fixed", estimator=form)
     estimator.learning.greatest_sigma = np.full(3, np.inf)
-    estimator.excitation_square = estimator.motion_square = 1e3  # it has moved
+    estimator.excitation_square = estimator.motion_square = 1e3  # it has moved,
+    estimator.learning.awake = seconds(1.0)  # and long enough
     lever = Lever.from_settings(SETTINGS, "fixed")
     z, factor = estimate(estimator), estimator.belief.joint_factor
     noise = np.linalg.cholesky(process_covariance(1e-3))
@@ -108,7 +110,8 @@ def test_annealing_falls_exponentially_to_the_floor() -> None:
     samples = recorded(1000)
     settings = SETTINGS | {"annealing_time": 0.5, "excitation_least": 0.0, "walk_ceiling": 10.0}
     estimator = Estimator(settings, start_of(samples), "fixed", adaptation="annealing")
-    estimator.excitation_square = estimator.motion_square = 1e3  # it has moved
+    estimator.excitation_square = estimator.motion_square = 1e3  # it has moved,
+    estimator.learning.awake = seconds(1.0)  # and long enough
     np.testing.assert_allclose(estimator.learning.walk, estimator.learning.ceiling)
     feed(estimator, samples, 1, 501)
     np.testing.assert_allclose(estimator.learning.walk, np.exp(-1.0) * estimator.learning.ceiling, rtol=1e-9)
