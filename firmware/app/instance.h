@@ -41,11 +41,12 @@ struct lever {
     bool settings_changed; /* since they were checked: their memory is faulty */
 };
 
-/* Where something mitigates: renews correction and lever damping. */
-void instance_mitigate(lever_t *lever);
+/* Where something mitigates: renews correction and lever damping. This and the next are called one after the other with
+ * the estimator: inlined, their stack would lie beneath that of the estimator. */
+__attribute__((noinline)) void instance_mitigate(lever_t *lever);
 
 /* With an aircraft: works the margin out, once a publish_period, but at most 25 times a second. */
-void instance_watch(lever_t *lever);
+__attribute__((noinline)) void instance_watch(lever_t *lever);
 
 /* Carries a command out, or says why not and changes nothing. */
 enum message_result instance_command(lever_t *lever, const lever_command_t *command);

@@ -13,13 +13,6 @@
 #define SETTINGS_LATE_US 1020000u /* and at most */
 #define SILENCE_US 20000u         /* or 1.25 sample periods: mitigation.h */
 
-/* Functions that lever_update() calls one after the other: inlined, their stack would lie beneath that of the estimator. */
-#ifdef __GNUC__
-#define APART __attribute__((noinline))
-#else
-#define APART
-#endif
-
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
 typedef char lever_fits_its_memory[(sizeof(struct lever) <= sizeof(lever_memory_t)) ? 1 : -1];
 
@@ -109,7 +102,7 @@ static bool carries_margin(const lever_t *lever)
            ((lever->estimator.faults & broken) == 0u) && (lever->estimator.cdkf.trust >= 1.0f);
 }
 
-APART void instance_watch(lever_t *lever)
+void instance_watch(lever_t *lever)
 {
     bounce_t *bounce = &lever->bounce;
     const uint32_t time_us = lever->estimator.time_us;
@@ -152,7 +145,7 @@ static enum lever_mode update(lever_t *lever, const lever_sample_t *sample)
     return mode;
 }
 
-APART void instance_mitigate(lever_t *lever)
+void instance_mitigate(lever_t *lever)
 {
     const uint32_t broken = (uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED;
     const estimator_t *estimator = &lever->estimator;

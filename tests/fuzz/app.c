@@ -27,7 +27,7 @@ enum {
 static uint64_t steps; /* of all inputs */
 
 /* What is left of the input. */
-typedef struct input {
+typedef struct fuzz_input {
     const uint8_t *at;
     const uint8_t *end;
 } input_t;

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from lever_cdkf.firmware.library import ffi
 from lever_cdkf.firmware.samples import sample_array
-from oracle.scale import PARAMETERS
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from oracle.scale import PARAMETERS
 from python.oracle import test_oracle_against_firmware as reference
 
 WITHIN = {"theta": reference.THETA_WITHIN, "theta_dot": reference.THETA_DOT_WITHIN}

@@ -42,7 +42,8 @@ def load_database(path: str | Path) -> Database:
     except OSError as error:
         raise LeverError(f"cannot read {path}: {error.strerror}") from None
     except Exception as error:  # each format has its own
-        raise LeverError(f"{path}: no database of CAN messages that cantools reads: {error}") from None
+        reason = " ".join(str(error).split())  # some are of several lines
+        raise LeverError(f"{path}: no database of CAN messages that cantools reads: {reason}") from None
     if not isinstance(loaded, Database) or not loaded.messages:
         raise LeverError(f"{path}: it describes no CAN message")
     return loaded

@@ -33,8 +33,10 @@ def put_crc(flash: bytearray) -> None:
 
 
 def instructions(elf: Path, function: str) -> list[tuple[int, bytes, str]]:
-    """Address, encoding and text of each instruction of a function."""
-    listing = tool("objdump", "-d", f"--disassemble={function}", elf)
+    """Return address, encoding and text of each instruction of a function, or of what the compiler has made of it, as
+    function.isra.0."""
+    (symbol,) = re.findall(rf" t ({re.escape(function)}(?:\.\w+)*)$", tool("nm", elf), re.MULTILINE | re.IGNORECASE)
+    listing = tool("objdump", "-d", f"--disassemble={symbol}", elf)
     rows = re.findall(r"^ *([0-9a-f]+):\t([0-9a-f]{4}(?: [0-9a-f]{4})?) *\t(.*)$", listing, re.MULTILINE)
     halfwords = [(int(address, 16), code.split(), text) for address, code, text in rows]
     return [
