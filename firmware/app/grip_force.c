@@ -6,11 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-void grip_force_start(grip_force_t *grip)
-{
-    (void)memset(grip, 0, sizeof *grip);
-}
-
 #if LEVER_GRIP_FORCE
 
 #define MEMORY 10.0f   /* of the comparison, and of the mean square [s] */

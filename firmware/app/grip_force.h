@@ -42,8 +42,6 @@ typedef struct grip_force {
     bool wrong; /* its gain is not what the settings say; until a reset */
 } grip_force_t;
 
-void grip_force_start(grip_force_t *grip);
-
 /* The force of a sample, `period` seconds after the last one; NULL: missing. Returns true when the force over the step
  * is known, and then fills in what the filter takes, but for `learn`. `alone`: the impulse without hands
  * (hands_predict); `error` as for cdkf_time_update(). */

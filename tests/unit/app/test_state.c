@@ -322,6 +322,26 @@ TEST(counts_of_two_bytes_are_restored_whole_and_a_sample_that_waits_is_dropped)
     TEST_ASSERT_FALSE(other->link.has_sample);
 }
 
+/* Values that are floats, one by one, but that no settings and samples make. */
+TEST(a_belief_that_would_overflow_is_refused)
+{
+    start_bus();
+    fly(50u);
+    cdkf_t *cdkf = &lever->estimator.cdkf;
+    snapshot_t *kept = lever->estimator.learning.kept;
+    float *const value[] = {&cdkf->growth, &cdkf->growth, &kept[0].s_ww[0], &kept[1].s_ww[0]};
+    static const float wrong[] = {-1.0f, 1.0e7f, 1.0e12f, 1.0e12f};
+    for (uint32_t i = 0u; i < (uint32_t)(sizeof wrong / sizeof wrong[0]); i++) {
+        const float right = *value[i];
+        *value[i] = wrong[i];
+        lever_state_save(lever, state);
+        *value[i] = right;
+        assert_refused(lever_init(&other_memory, &config));
+    }
+    lever_state_save(lever, state);
+    TEST_ASSERT_TRUE(lever_state_restore(lever_init(&other_memory, &config), state));
+}
+
 /* A CRC-32, by another implementation, over version, and count and greatest value of each row. */
 TEST(the_layout_is_a_number_of_its_own)
 {
