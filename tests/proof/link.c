@@ -123,8 +123,7 @@ void estimator_health(const estimator_t *estimator, lever_health_t *health)
     health->recoveries = any_word();
 }
 
-uint8_t alarm_next(
-    uint8_t state, const margin_t *margin, const lever_aircraft_t *aircraft, bool carried, bool doubtful)
+uint8_t alarm_next(uint8_t state, const margin_t *margin, const lever_aircraft_t *aircraft, bool carried, bool doubtful)
 {
     (void)doubtful;
     (void)state;
