@@ -79,7 +79,8 @@ def _least_critical(plan: Plan) -> float:
     """Return the least gearing that is critical at any time of a flight [1]."""
     truth = truth_of(plan)
     at = np.arange(0, len(truth.rest), 1000 // STRIDE)
-    return float(critical_gearing(plan.aircraft, truth.transfer(at)).min())
+    unmitigated = replace(plan, low_pass=0.0).aircraft
+    return float(critical_gearing(unmitigated, truth.transfer(at)).min())
 
 
 def geared(plan: Plan, ratio: float) -> Plan:
