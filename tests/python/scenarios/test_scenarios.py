@@ -30,7 +30,7 @@ def rms(name: str) -> dict[str, float]:
 
 
 REFUSED = {"bounce": 20}
-"""Outputs that the gate may refuse: a change in the limit cycle begins the levels anew, and theta is refused for 19 ms."""
+"""Outputs that the gate may refuse: a change in the limit cycle begins the levels anew, and theta is off for 19 ms."""
 
 
 @pytest.mark.parametrize("name", scenario.names())
