@@ -19,6 +19,7 @@ NOT_RUN = {
     r"lever (flash|qemu)": "needs the image, with which pages of firmware/port run it",
     r"lever (compare --(out|quick|envelope)|(envelope|bounce|faults) --json|figures --(out|campaign))": "takes minutes",
     r"lever soak --json": "takes minutes",
+    r"model\.mat": "needs a user's own; sil/lever_sil/aircraft/README.md makes and flies one",
     r"lever (bounce|envelope|faults) --quick": "is what tests/python/{bounce,envelope,faults} do",
     r"lever (bounce|envelope|figures) --only|lever soak --hours": "README.md has the same",
     r"lever compare --(score|data)|lever (compare|figures) --paper": "sil/lever_sil/study/PAPER.md has the same",
