@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 WORK = 1.0
 """Processor time that a chunk is meant to take [s]: far above the 1 ms that Dask costs a task, and little to lose."""
-WORK_SIDE_BY_SIDE = 20.0
-"""The same with baselines, which step through all flights of a chunk at once: the more flights, the cheaper is each."""
 
 _NAME = re.compile(r"([0-9a-f]{16})-(\d{10})-(\d{10})\.parquet")
 _LIBRARIES = ("lever_cdkf", "lever_loop", "lever_bulk")
@@ -57,8 +55,7 @@ class Plan:
         self.model = first.config.choices["model"]
         entrants = [ENTRANTS[name] for name in spec.estimators]
         cost = self.minutes * sum(entrant.cost for entrant in entrants)
-        self.work = WORK_SIDE_BY_SIDE if any(entrant.side_by_side for entrant in entrants) else WORK
-        self.size = spec.chunk or max(1, math.ceil(self.work / cost))
+        self.size = spec.chunk or max(1, math.ceil(WORK / cost))
         self.count = math.ceil(spec.flights / self.size)
 
     def chunk(self, number: int) -> Chunk:

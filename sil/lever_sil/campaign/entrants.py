@@ -45,8 +45,6 @@ class Entrant(ABC):
     title: str
     cost: float
     """Processor time for a minute of flight [s], roughly: a constant, as it makes the size of chunks."""
-    side_by_side = False
-    """Whether flights are cheaper the more of them are tracked at once."""
 
     @abstractmethod
     def unfit(self, scenario: Scenario) -> str:
@@ -111,8 +109,6 @@ _TAKEN = (
 
 class Published(Entrant):
     """A baseline of the comparison, given the noise, walk and first guess of the scenario's settings."""
-
-    side_by_side = True
 
     def __init__(self, name: str, cost: float) -> None:
         self.name, self.title = name, BASELINES[name].title

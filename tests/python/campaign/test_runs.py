@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.native import run_samples
-from lever_sil.campaign import chunks, figures, runs, spec
+from lever_sil.campaign import chunks, figures, runs
 from lever_sil.campaign.chunks import Chunk, Plan
 from lever_sil.campaign.entrants import ENTRANTS, Track
 from lever_sil.campaign.flight import simulate
@@ -131,15 +131,13 @@ def test_chunks_cover_all_flights_once(small: Plan) -> None:
         plan = Plan(dataclasses.replace(small.spec, chunk=flights))
         covered = [flight for number in range(plan.count) for flight in range(*_ends(plan.chunk(number)))]
         assert covered == list(range(24))
-    assert Plan(spec.load("tracking")).size * 0.1 > 10.0  # seconds of work, measured
 
 
-def test_a_chunk_is_a_second_of_work_unless_baselines_share_it(small: Plan) -> None:
+def test_a_chunk_is_about_a_second_of_work(small: Plan) -> None:
     """So that a campaign that is killed after some seconds has kept something."""
-    spec = dataclasses.replace(small.spec, chunk=None, estimators=("dual", "joint"))
-    alone, beside = Plan(spec), Plan(dataclasses.replace(spec, estimators=("dual", "rls")))
-    assert alone.size * alone.minutes * 0.06 == pytest.approx(1.0, rel=0.2)
-    assert beside.size > 10 * alone.size
+    for estimators in (("dual", "joint"), ("dual", "rls"), ("dual", "joint", "joint_ekf", "rls")):
+        plan = Plan(dataclasses.replace(small.spec, chunk=None, estimators=estimators))
+        assert plan.size * plan.minutes * 0.035 * len(estimators) == pytest.approx(1.0, rel=0.3)
 
 
 def _ends(chunk: Chunk) -> tuple[int, int]:
