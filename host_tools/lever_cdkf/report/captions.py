@@ -1,7 +1,7 @@
 """The captions of the report: what its charts show, of which model, and against which truth."""
 
 from ..results import whiteness
-from .charts import transfer
+from .charts import stability, transfer
 from .run import Run
 
 ABOUT_MODEL = {
@@ -76,6 +76,23 @@ def feedthrough_caption(run: Run) -> str:
             f"After the first third of the run the complex error was {100.0 * accuracy.error:.1f} % rms; ±2σ held the "
             f"true magnitude {100.0 * accuracy.gain_covered:.0f} % and the true phase "
             f"{100.0 * accuracy.phase_covered:.0f} % of the time."
+        )
+    return " ".join(sentences)
+
+
+def margin_caption(run: Run) -> str:
+    """Return what the chart of the margin to collective bounce shows, and how good it was where the truth is known."""
+    sentences = [
+        "By how much the loop through arm, lever and rotor may grow until it is unstable, with a band of ±2σ; at 0 dB "
+        "it is. Dotted lines are that limit and those of warning and alarm, bars at the foot the times of these. "
+        "Below, the frequency at which it would begin, and with mitigation the correction of the lever's angle. There "
+        "is nothing where the estimate does not carry it."
+    ]
+    if (accuracy := stability.accuracy(run)) is not None:
+        sentences.append(
+            f"After the first third of the run the estimated margin was {abs(accuracy.bias):.1f} dB too "
+            f"{'high' if accuracy.bias > 0.0 else 'low'} (median; an estimate that is too high warns too late), and "
+            f"±2σ held the true one {100.0 * accuracy.covered:.0f} % of the time."
         )
     return " ".join(sentences)
 

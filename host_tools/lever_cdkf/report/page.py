@@ -153,10 +153,7 @@ def _stability(page: Page, run: Run) -> None:
         page.figure(
             "figure-stability",
             stability.margin(run, limits),
-            "By how much the loop through arm, lever and rotor may grow until it is unstable, with a band of ±2σ; at "
-            "0 dB it is. Dotted lines are that limit and those of warning and alarm, bars at the foot the times of "
-            "these. Below, the frequency at which it would begin, and with mitigation the correction of the lever's "
-            "angle. There is nothing where the estimate does not carry it.",
+            captions.margin_caption(run),
         ),
     )
 

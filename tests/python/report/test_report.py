@@ -15,7 +15,7 @@ import pytest
 import screenshot
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.native import enum_words
-from lever_cdkf.report import summary_html, write_report
+from lever_cdkf.report import captions, summary_html, write_report
 from lever_cdkf.report.charts import tracking
 from lever_cdkf.report.run import COHERENT, Run
 from lever_sil.run.runner import Result
@@ -194,6 +194,21 @@ def test_estimates_that_are_flagged_are_grey(result: Result) -> None:
     assert grey["line"]["width"] > curves["estimate"]["line"]["width"]
     assert grey["hoverinfo"] == "skip"
     assert "hovertemplate" not in grey
+
+
+def test_the_margin_s_caption_says_how_far_it_was_from_the_truth(result: Result) -> None:
+    """By closed form: 2 dB too high with a σ of 1.5 dB, but for the first third, which is not counted, and a quarter
+    of the rest, where it is 5 dB too low."""
+    time = result.trace["time_s"]
+    late = time >= time[-1] - (time[-1] - time[0]) / 6.0
+    error = np.where(time < time[-1] / 3.0, 40.0, np.where(late, -5.0, 2.0))
+    known = {"gain_margin_dB": 3.0 + error, "gain_margin_sigma_dB": np.full(len(time), 1.5)}
+    run = Run({**result.trace, **known, "gain_margin_true_dB": np.full(len(time), 3.0)}, result.summary)
+    assert "2.0 dB too high (median" in captions.margin_caption(run)
+    assert "held the true one 75 % of the time" in captions.margin_caption(run)
+    without = Run({**result.trace, **known}, result.summary)
+    assert "truth" not in captions.margin_caption(without)
+    assert "held" not in captions.margin_caption(without)
 
 
 def test_the_headline_begins_with_the_warning(result: Result) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...arrays import Array
@@ -13,6 +15,28 @@ from ..series import spread_indices
 
 _POINTS = 1500
 _COLOURS = {"warning": "joint", "alarm": "fault"}
+
+
+class Accuracy(NamedTuple):
+    """How good the margin was after the first third of a run."""
+
+    bias: float
+    """Median of estimated minus true margin [dB]."""
+    covered: float
+    """Part of the time that ±2σ held the true margin."""
+
+
+def accuracy(run: Run) -> Accuracy | None:
+    """Return how good the margin was; None where there is no truth, or the margin was never known."""
+    gain, sigma, true = (run.column(name) for name in ("gain_margin_dB", "gain_margin_sigma_dB", TRUE_MARGIN))
+    if gain is None or sigma is None or true is None:
+        return None
+    later = slice(len(gain) // 3, None)
+    error, sigma = (gain - true)[later], sigma[later]
+    known = np.isfinite(error * sigma)
+    if not known.any():
+        return None
+    return Accuracy(float(np.median(error[known])), float(np.mean(np.abs(error) <= 2.0 * sigma, where=known)))
 
 
 def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
