@@ -95,11 +95,9 @@ bool instance_is_estimating(const lever_t *lever)
 /* The estimate is trustworthy enough for a margin: it has been learnt, and the sensors work. */
 static bool carries_margin(const lever_t *lever)
 {
-    const uint32_t broken = (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_CLOCK |
-                            (uint32_t)LEVER_FAULT_BOUND | (uint32_t)LEVER_FAULT_RECOVERED;
     const enum lever_mode mode = lever->estimator.mode;
-    return verdict_of_now(lever)->margin && ((mode == LEVER_MODE_RUN) || (mode == LEVER_MODE_FROZEN)) &&
-           ((lever->estimator.faults & broken) == 0u) && (lever->estimator.cdkf.trust >= 1.0f);
+    return verdict_permits(verdict_of_now(lever)->margin, lever->estimator.faults) &&
+           ((mode == LEVER_MODE_RUN) || (mode == LEVER_MODE_FROZEN)) && (lever->estimator.cdkf.trust >= 1.0f);
 }
 
 void instance_watch(lever_t *lever)
@@ -141,13 +139,12 @@ static enum lever_mode update(lever_t *lever, const lever_sample_t *sample)
     to_gate->advances = ((faults & (uint32_t)LEVER_FAULT_CLOCK) == 0u);
     to_gate->measured = ((faults & blind) != blind);
     to_gate->permitted = permits_torque(lever);
-    to_gate->harmful = !verdict_of_now(lever)->torque;
+    to_gate->harmful = !verdict_permits(verdict_of_now(lever)->torque, faults);
     return mode;
 }
 
 void instance_mitigate(lever_t *lever)
 {
-    const uint32_t broken = (uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED;
     const estimator_t *estimator = &lever->estimator;
     const setup_t *setup = &estimator->setup;
     const torque_sample_t *to_gate = &lever->to_gate;
@@ -163,8 +160,8 @@ void instance_mitigate(lever_t *lever)
         .drive = lever->gate.gain,
         .mitigation = lever->bounce.chosen,
         .advances = to_gate->advances,
-        .permitted = to_gate->permitted && verdict_of_now(lever)->correction &&
-                     !torque_gate_is_abandoned(&lever->gate) && ((faults & broken) == 0u),
+        .permitted = to_gate->permitted && verdict_permits(verdict_of_now(lever)->correction, faults) &&
+                     !torque_gate_is_abandoned(&lever->gate),
         .sensed = ((faults & (uint32_t)LEVER_FAULT_THETA) == 0u) && (estimator->base_missing <= 0.0f),
         .fits = !evidence_has(&estimator->learning.evidence, EVIDENCE_BASE),
         .rated = ((faults & (uint32_t)LEVER_FAULT_THETA_DOT) == 0u),
