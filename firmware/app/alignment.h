@@ -2,21 +2,9 @@
 #ifndef APP_ALIGNMENT_H
 #define APP_ALIGNMENT_H
 
-#include "app/estimator.h"
+#include "app/estimator_types.h"
 
 #include <stdbool.h>
-
-/* A sample after its checks: outputs, and inputs of which a missing base acceleration is the last one, a missing
- * torque 0. */
-typedef struct checked {
-    float y[CDKF_OUTPUTS];
-    bool valid[CDKF_OUTPUTS];
-    bool base;    /* the base acceleration is valid */
-    float z_ddot; /* compensated for gain and delay of the sensor */
-    float tau_m;
-    float grip_force; /* [N] */
-    bool gripped;     /* it is valid */
-} checked_t;
 
 /* Begins with this sample. */
 void alignment_begin(estimator_t *estimator, const checked_t *sample);

@@ -2,30 +2,16 @@
 #ifndef APP_INSTANCE_H
 #define APP_INSTANCE_H
 
+#include "app/bounce.h"
 #include "app/dither.h"
 #include "app/estimator.h"
-#include "app/link.h"
+#include "app/link_types.h"
 #include "app/torque_gate.h"
-#include "bounce/mitigation.h"
 #include "can/messages.h"
 #include "lever_cdkf.h"
 
 #include <stdbool.h>
 #include <stdint.h>
-
-enum instance_same { INSTANCE_SAME_THETA = 1, INSTANCE_SAME_Z_DDOT = 2 };
-
-/* The watch over the loop of arm, lever and rotor, and what is done about it. */
-typedef struct bounce {
-    mitigation_t mitigation;
-    uint8_t chosen;                   /* enum lever_mitigation */
-    uint8_t state;                    /* enum lever_bounce */
-    uint8_t same;                     /* of enum instance_same: what the last sample measured as the one before */
-    bool mitigates;                   /* one is chosen, or still fades */
-    uint32_t time_us;                 /* of the sample with which the margin was worked out */
-    const lever_aircraft_t *aircraft; /* NULL: none */
-    margin_t margin;
-} bounce_t;
 
 struct lever {
     estimator_t estimator;
@@ -41,12 +27,12 @@ struct lever {
     bool settings_changed; /* since they were checked: their memory is faulty */
 };
 
-/* Where something mitigates: renews correction and lever damping. This and the next are called one after the other with
- * the estimator: inlined, their stack would lie beneath that of the estimator. */
-__attribute__((noinline)) void instance_mitigate(lever_t *lever);
+/* Starts from a checked configuration, whose settings are used as long as the instance is. */
+void instance_init(lever_t *lever, const lever_config_t *config);
 
-/* With an aircraft: works the margin out, once a publish_period, but at most 25 times a second. */
-__attribute__((noinline)) void instance_watch(lever_t *lever);
+/* The functions of lever_cdkf.h of the same names. */
+enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample);
+void instance_platform(lever_t *lever, const lever_platform_t *platform);
 
 /* Carries a command out, or says why not and changes nothing. */
 enum message_result instance_command(lever_t *lever, const lever_command_t *command);

@@ -1,6 +1,5 @@
 #include "app/link.h"
 
-#include "app/instance.h"
 #include "math/elapsed.h"
 
 #include <math.h>
@@ -285,7 +284,7 @@ enum lever_mode link_step(lever_t *lever)
         const bool was_driving = instance_is_driving(lever);
         const bool mitigates = lever->bounce.mitigates;
         link->has_sample = false;
-        (void)lever_update(lever, &link->sample);
+        (void)instance_update(lever, &link->sample);
         pass_time(link, link->sample.time_us);
         link->latched |= instance_faults(lever);
         uint32_t due = BIT(OUTPUT_STATE_ESTIMATE) | divided_due(link);

@@ -1,5 +1,4 @@
 /* What each message to send says of an instance. */
-#include "app/instance.h"
 #include "app/link.h"
 #include "math/bounds.h"
 

@@ -3,16 +3,9 @@
 #ifndef APP_PREDICTION_H
 #define APP_PREDICTION_H
 
-#include "app/alignment.h"
-#include "app/estimator.h"
+#include "app/estimator_types.h"
 
 #include <stdint.h>
-
-/* The inputs of the last sample, compensated: base acceleration [m/s^2], torque [N m]. */
-typedef struct inputs {
-    float z_ddot;
-    float tau_m;
-} inputs_t;
 
 /* Predicts to the sample, `periods` sample periods after the last one. Its outputs become deviations from the trim;
  * those that are spikes become invalid, which the faults say. */

@@ -104,7 +104,7 @@ static const state_row_t rows[] = {
     FLAGS(bounce.mitigation.rated, bounce.mitigation.started),
     BYTES(bounce.chosen, bounce.chosen, (uint32_t)LEVER_MITIGATION_COUNT - 1u),
     BYTES(bounce.state, bounce.state, (uint32_t)LEVER_BOUNCE_ALARM),
-    BYTES(bounce.same, bounce.same, (uint32_t)INSTANCE_SAME_THETA | (uint32_t)INSTANCE_SAME_Z_DDOT),
+    BYTES(bounce.same, bounce.same, (uint32_t)BOUNCE_SAME_THETA | (uint32_t)BOUNCE_SAME_Z_DDOT),
     FLAGS(bounce.mitigates, bounce.mitigates),
     WORDS(bounce.time_us, bounce.time_us),
     WORDS(bounce.margin.gain, bounce.margin.frequency_sigma),

@@ -1,4 +1,5 @@
 #include "app/verdict.h"
+#include "lever_cdkf.h"
 
 #define ON(evidence) ((uint32_t)1u << (uint32_t)(evidence))
 #define NOTHING ACTION_NOTHING
@@ -6,11 +7,16 @@
 #define OPEN ACTION_OPEN
 #define INFLATE ACTION_INFLATE
 #define LEVELS ACTION_LEVELS
+#define NEVER VERDICT_NEVER
+#define ALWAYS 0u
+/* The clock advances, and the filter was not just restarted. */
+#define RUNNING ((uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED)
+/* That, and theta and the base are measured, and no parameter rests on a bound. */
+#define SOUND (RUNNING | (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_BOUND)
 
 const verdict_row_t verdict_rows[VERDICT_COUNT] = {
 #define VERDICT(name, evidence, learn, adapt, torque, correction, margin, entry, exit, meaning)                        \
-    {(evidence), (learn) != 0, (adapt) != 0, (torque) != 0, (correction) != 0, (margin) != 0, (uint8_t)(entry),        \
-        (uint8_t)(exit)},
+    {(evidence), (learn) != 0, (adapt) != 0, (torque), (correction), (margin), (uint8_t)(entry), (uint8_t)(exit)},
 #include "app/verdict.def"
 };
 

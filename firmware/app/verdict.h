@@ -30,14 +30,22 @@ typedef struct verdict_row {
     uint32_t evidence; /* a bit each, of enum evidence_id */
     bool learn;
     bool adapt;
-    bool torque;
-    bool correction;
-    bool margin;
-    uint8_t entry; /* enum verdict_action */
+    uint32_t torque;     /* faults that forbid it, of enum lever_fault and VERDICT_NEVER */
+    uint32_t correction; /* likewise */
+    uint32_t margin;     /* likewise */
+    uint8_t entry;       /* enum verdict_action */
     uint8_t exit;
 } verdict_row_t;
 
 extern const verdict_row_t verdict_rows[VERDICT_COUNT];
+
+#define VERDICT_NEVER 0x80000000u /* forbids it with any faults */
+
+/* Whether an action of a row is permitted with these faults. */
+static inline bool verdict_permits(uint32_t forbidding, uint32_t faults)
+{
+    return ((faults | VERDICT_NEVER) & forbidding) == 0u;
+}
 
 /* The verdict on evidence that is present, a bit each. */
 uint8_t verdict_of(uint32_t present);

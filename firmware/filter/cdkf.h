@@ -34,6 +34,7 @@
 #ifndef FILTER_CDKF_H
 #define FILTER_CDKF_H
 
+#include "filter/considered.h"
 #include "model/model.h"
 #include "model/scaling.h"
 
@@ -47,40 +48,6 @@
 #define SIGMA_MEAN 0.166666667f   /* m = 1 / (2 h^2) */
 
 enum { CDKF_OUTPUTS = MODEL_STATES, CDKF_ROWS = MODEL_PARAMETERS + MODEL_STATES };
-
-/* A calibration error: not learnt, but considered (Schmidt 1966; Bierman 1977, chapter VIII): the estimates' errors
- * include what a unit of it makes of them. Those of w and x are the filter's own, + its standard deviation times w
- * (in coordinates of the columns of S_ww) and S_xw w + x. The gain of the filter does not know of it, so estimates are
- * what they are without. */
-typedef struct considered {
-    float w[MODEL_PARAMETERS];
-    float x[MODEL_STATES];
-    float cross[MODEL_PARAMETERS]; /* pending: sum of what the outputs see of S_ww times what they see of x */
-    float vector;                  /* pending: sum of what they see of x times the innovations */
-    float information;             /* pending: sum of its square */
-} considered_t;
-
-/* The last is no calibration error but a constant acceleration from one moment on, which is estimated for a while. */
-enum considered_error { CDKF_BASE_GAIN, CDKF_BASE_DELAY, CDKF_TORQUE_GAIN, CDKF_FRICTION, CDKF_STEP, CDKF_CONSIDERED };
-
-enum { CDKF_CALIBRATION = CDKF_STEP };
-
-/* What samples say of w in coordinates of the columns of S_ww. */
-typedef struct information {
-    float matrix[MODEL_PARAMETERS * MODEL_PARAMETERS]; /* symmetric: its upper triangle */
-    float vector[MODEL_PARAMETERS];                    /* the matrix times the correction */
-} information_t;
-
-/* Adds an innovation `nu` that sees row times the columns of S_ww, both in units of its standard deviation. */
-static inline void information_add(information_t *information, const float row[MODEL_PARAMETERS], float nu)
-{
-    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
-        information->vector[i] += row[i] * nu;
-        for (uint32_t j = i; j < (uint32_t)MODEL_PARAMETERS; j++) {
-            information->matrix[(i * (uint32_t)MODEL_PARAMETERS) + j] += row[i] * row[j];
-        }
-    }
-}
 
 typedef struct cdkf {
     float w[MODEL_PARAMETERS]; /* scaled parameters (model/scaling.h) */
@@ -146,13 +113,6 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
  * the sample says of w is added to the pending information. An output that is not valid has the innovation 0. */
 void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
     innovation_t innovation[CDKF_OUTPUTS]);
-
-/* What innovations say of a considered error b, by themselves: its estimate is vector / information, of variance
- * 1 / information (Friedland 1969). */
-typedef struct score {
-    float vector;
-    float information;
-} score_t;
 
 /* What a block has taught: the change of w, and by how much its variances have become smaller. */
 typedef struct correction {

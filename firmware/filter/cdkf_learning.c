@@ -1,6 +1,5 @@
 /* Learning of the parameters, once a block: see cdkf.h. */
 #include "filter/cdkf.h"
-#include "filter/considered.h"
 #include "math/bounds.h"
 #include "math/factor.h"
 #include "math/share.h"
@@ -12,6 +11,58 @@
 #define L ((uint32_t)MODEL_PARAMETERS)
 #define ROWS ((uint32_t)CDKF_ROWS)
 #define FINITE_MOST 1.0e17f /* squares stay inside the range of float */
+
+/* --- considered errors while the columns of S change --------------------------------------------------------------- */
+
+typedef float of_w_t[CDKF_CONSIDERED][MODEL_PARAMETERS];
+
+/* Before they change: S_ww w, which is kept in between, and S_xw w + x stay. */
+static void lift(cdkf_t *cdkf, of_w_t of_w)
+{
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
+        considered_t *considered = &cdkf->considered[c];
+        for (uint32_t i = 0u; i < L; i++) {
+            of_w[c][i] = factor_dot_three(&cdkf->s[i * L], considered->w);
+        }
+        for (uint32_t i = 0u; i < N; i++) {
+            considered->x[i] += factor_dot_three(&cdkf->s[(L + i) * L], considered->w);
+        }
+    }
+}
+
+/* After it. */
+static void lower(cdkf_t *cdkf, of_w_t of_w)
+{
+    const float *s = cdkf->s;
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
+        considered_t *considered = &cdkf->considered[c];
+        float *w = considered->w; /* forward substitution */
+        w[0] = of_w[c][0] / s[0];
+        w[1] = (of_w[c][1] - (s[L] * w[0])) / s[L + 1u];
+        w[2] = (of_w[c][2] - (s[2u * L] * w[0]) - (s[(2u * L) + 1u] * w[1])) / s[(2u * L) + 2u];
+        for (uint32_t i = 0u; i < N; i++) {
+            considered->x[i] -= factor_dot_three(&s[(L + i) * L], w);
+        }
+    }
+}
+
+/* Covariance of rows i and j of [S_ww; S_xw], with what the considered errors make of both. */
+static float covariance_of(const cdkf_t *cdkf, uint32_t i, uint32_t j)
+{
+    const float *a = &cdkf->s[i * L];
+    const float *b = &cdkf->s[j * L];
+    float covariance = factor_dot_three(a, b);
+    for (uint32_t c = 0u; c < cdkf->acting; c++) {
+        const considered_t *considered = &cdkf->considered[c];
+        const float sigma = cdkf->considered_sigma[c];
+        const float of_a = factor_dot_three(a, considered->w) + ((i < L) ? 0.0f : considered->x[i - L]);
+        const float of_b = factor_dot_three(b, considered->w) + ((j < L) ? 0.0f : considered->x[j - L]);
+        covariance += (sigma * of_a) * (sigma * of_b);
+    }
+    return covariance;
+}
+
+/* --- learning ------------------------------------------------------------------------------------------------------ */
 
 void cdkf_init(cdkf_t *cdkf, const model_t *model, const model_constants_t *constants, const prior_t *prior)
 {
@@ -125,8 +176,8 @@ static void open_parameters(cdkf_t *cdkf)
 
 void cdkf_open(cdkf_t *cdkf)
 {
-    considered_of_w_t unused; /* what the prior says of w is not of these errors */
-    considered_lift(cdkf, unused);
+    of_w_t unused; /* what the prior says of w is not of these errors */
+    lift(cdkf, unused);
     open_parameters(cdkf);
     considered_start_w(cdkf->considered);
 }
@@ -146,8 +197,8 @@ void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot)
 
 void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot)
 {
-    considered_of_w_t of_w;
-    considered_lift(cdkf, of_w);
+    of_w_t of_w;
+    lift(cdkf, of_w);
     open_parameters(cdkf);
     (void)memcpy(cdkf->w, snapshot->w, sizeof snapshot->w);
     uint32_t k = 0u;
@@ -159,7 +210,7 @@ void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot)
     }
     cdkf->trust = snapshot->trust;
     if (snapshot->trust >= 1.0f) { /* what the considered errors made of w then was nearly the same */
-        considered_lower(cdkf, of_w);
+        lower(cdkf, of_w);
     } else {
         considered_start_w(cdkf->considered);
     }
@@ -169,8 +220,8 @@ void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
 {
     const float growth = cdkf->growth * period;
     if (growth != 0.0f) { /* a NaN is to show */
-        considered_of_w_t of_w;
-        considered_lift(cdkf, of_w);
+        of_w_t of_w;
+        lift(cdkf, of_w);
         const float stretch = sqrtf(1.0f + growth);
         const float shrink = 1.0f / stretch;
         const float rest = sqrtf(growth) * shrink;
@@ -182,7 +233,7 @@ void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
         for (uint32_t k = 0u; k < (L * L); k++) {
             cdkf->s[k] *= stretch;
         }
-        considered_lower(cdkf, of_w);
+        lower(cdkf, of_w);
         if (joint) {
             add_to_state(cdkf, unexplained);
         }
@@ -192,15 +243,15 @@ void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
 void cdkf_walk(cdkf_t *cdkf, float period, const float variance[MODEL_PARAMETERS], bool joint)
 {
     float unexplained[N * L];
-    considered_of_w_t of_w;
-    considered_lift(cdkf, of_w);
+    of_w_t of_w;
+    lift(cdkf, of_w);
     for (uint32_t i = 0u; i < L; i++) {
         float rest[N];
         factor_add_noise(cdkf->s, ROWS, L, i, sqrtf((cdkf->walk[i] * period) + variance[i]), rest);
         unexplained[i] = rest[0];
         unexplained[L + i] = rest[1];
     }
-    considered_lower(cdkf, of_w);
+    lower(cdkf, of_w);
     if (joint) {
         add_to_state(cdkf, unexplained);
     }
@@ -238,21 +289,21 @@ void cdkf_draw(cdkf_t *cdkf, const model_t *model, const model_constants_t *cons
 float cdkf_state_sigma(const cdkf_t *cdkf, uint32_t i)
 {
     const float *own = &cdkf->s_xx[i * N];
-    return sqrtf(considered_covariance(cdkf, L + i, L + i) + (own[0] * own[0]) + (own[1] * own[1]));
+    return sqrtf(covariance_of(cdkf, L + i, L + i) + (own[0] * own[0]) + (own[1] * own[1]));
 }
 
 float cdkf_parameter_sigma(const cdkf_t *cdkf, uint32_t i)
 {
-    return scaling_slope(&cdkf->scaling, cdkf->p, i) * sqrtf(considered_covariance(cdkf, i, i));
+    return scaling_slope(&cdkf->scaling, cdkf->p, i) * sqrtf(covariance_of(cdkf, i, i));
 }
 
 void cdkf_correlation(const cdkf_t *cdkf, float correlation[MODEL_PARAMETERS])
 {
-    const float sigma[L] = {sqrtf(considered_covariance(cdkf, 0u, 0u)), sqrtf(considered_covariance(cdkf, 1u, 1u)),
-        sqrtf(considered_covariance(cdkf, 2u, 2u))};
-    correlation[0] = considered_covariance(cdkf, 0u, 1u) / (sigma[0] * sigma[1]);
-    correlation[1] = considered_covariance(cdkf, 0u, 2u) / (sigma[0] * sigma[2]);
-    correlation[2] = considered_covariance(cdkf, 1u, 2u) / (sigma[1] * sigma[2]);
+    const float sigma[L] = {
+        sqrtf(covariance_of(cdkf, 0u, 0u)), sqrtf(covariance_of(cdkf, 1u, 1u)), sqrtf(covariance_of(cdkf, 2u, 2u))};
+    correlation[0] = covariance_of(cdkf, 0u, 1u) / (sigma[0] * sigma[1]);
+    correlation[1] = covariance_of(cdkf, 0u, 2u) / (sigma[0] * sigma[2]);
+    correlation[2] = covariance_of(cdkf, 1u, 2u) / (sigma[1] * sigma[2]);
 }
 
 bool cdkf_is_valid(const cdkf_t *cdkf)

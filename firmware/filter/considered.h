@@ -1,10 +1,52 @@
-/* What the considered errors make of the estimates' errors (considered_t in cdkf.h), and what of a step of the filter
- * they need. Only the files of the filter include this.
- */
+/* What the considered errors make of the estimates' errors, and what of a step of the filter they need. */
 #ifndef FILTER_CONSIDERED_H
 #define FILTER_CONSIDERED_H
 
-#include "filter/cdkf.h"
+#include "model/model.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+/* A calibration error: not learnt, but considered (Schmidt 1966; Bierman 1977, chapter VIII): the estimates' errors
+ * include what a unit of it makes of them. Those of w and x are the filter's own, + its standard deviation times w
+ * (in coordinates of the columns of S_ww) and S_xw w + x. The gain of the filter does not know of it, so estimates are
+ * what they are without. */
+typedef struct considered {
+    float w[MODEL_PARAMETERS];
+    float x[MODEL_STATES];
+    float cross[MODEL_PARAMETERS]; /* pending: sum of what the outputs see of S_ww times what they see of x */
+    float vector;                  /* pending: sum of what they see of x times the innovations */
+    float information;             /* pending: sum of its square */
+} considered_t;
+
+/* The last is no calibration error but a constant acceleration from one moment on, which is estimated for a while. */
+enum considered_error { CDKF_BASE_GAIN, CDKF_BASE_DELAY, CDKF_TORQUE_GAIN, CDKF_FRICTION, CDKF_STEP, CDKF_CONSIDERED };
+
+enum { CDKF_CALIBRATION = CDKF_STEP };
+
+/* What samples say of w in coordinates of the columns of S_ww. */
+typedef struct information {
+    float matrix[MODEL_PARAMETERS * MODEL_PARAMETERS]; /* symmetric: its upper triangle */
+    float vector[MODEL_PARAMETERS];                    /* the matrix times the correction */
+} information_t;
+
+/* Adds an innovation `nu` that sees row times the columns of S_ww, both in units of its standard deviation. */
+static inline void information_add(information_t *information, const float row[MODEL_PARAMETERS], float nu)
+{
+    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
+        information->vector[i] += row[i] * nu;
+        for (uint32_t j = i; j < (uint32_t)MODEL_PARAMETERS; j++) {
+            information->matrix[(i * (uint32_t)MODEL_PARAMETERS) + j] += row[i] * row[j];
+        }
+    }
+}
+
+/* What innovations say of a considered error b, by themselves: its estimate is vector / information, of variance
+ * 1 / information (Friedland 1969). */
+typedef struct score {
+    float vector;
+    float information;
+} score_t;
 
 /* Gain of one output on the state for given w, and the innovation's standard deviation; 0 when it is not valid. */
 typedef struct gain {
@@ -65,13 +107,5 @@ score_t considered_score(const considered_t *considered, const information_t *pe
 
 /* The parameters learn: u is the reverse factor of I + information (math/factor.h). */
 void considered_learn(considered_t considered[CDKF_CONSIDERED], uint32_t count, float trust, const float *u);
-
-/* Before and after the columns of S change: S_ww w, which is kept in between, and S_xw w + x stay. */
-typedef float considered_of_w_t[CDKF_CONSIDERED][MODEL_PARAMETERS];
-void considered_lift(cdkf_t *cdkf, considered_of_w_t of_w);
-void considered_lower(cdkf_t *cdkf, considered_of_w_t of_w);
-
-/* Covariance of rows i and j of [S_ww; S_xw], with what the considered errors make of both. */
-float considered_covariance(const cdkf_t *cdkf, uint32_t i, uint32_t j);
 
 #endif

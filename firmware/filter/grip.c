@@ -1,5 +1,7 @@
 #include "filter/grip.h"
 
+#include "math/factor.h"
+
 #define L ((uint32_t)MODEL_PARAMETERS)
 #define SPIKE 8.0f /* standard deviations */
 #define COLUMNS 5u /* of S-_xx: its own, the walk of theta_dot, second differences, theta beside it */
@@ -49,14 +51,14 @@ static bool weigh(grip_seen_t *seen, const float *theta, const float *theta_dot,
     return (seen->innovation * seen->innovation) < ((SPIKE * SPIKE) * spread);
 }
 
-bool grip_predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period, grip_seen_t *seen)
+bool grip_predict_state_columns(
+    cdkf_t *cdkf, const model_response_t *response, const step_noise_t *noise, float period, grip_seen_t *seen)
 {
-    const step_noise_t noise = step_noise(cdkf, response, period);
-    const float rate = sqrtf(noise.variance);
-    const float second = sqrtf(noise.second);
+    const float rate = sqrtf(noise->variance);
+    const float second = sqrtf(noise->second);
     const float column[COLUMNS] = {seen->column[0], seen->column[1], seen->walk * rate, second, 0.0f};
     float theta[COLUMNS + 1u] = {
-        cdkf->s_xx[0], 0.0f, 0.5f * period * rate, 0.5f * period * second, sqrtf(noise.angle), 0.0f};
+        cdkf->s_xx[0], 0.0f, 0.5f * period * rate, 0.5f * period * second, sqrtf(noise->angle), 0.0f};
     float theta_dot[COLUMNS + 1u] = {cdkf->s_xx[2], cdkf->s_xx[3], rate, second, 0.0f, 0.0f};
     response_move(response, period, &theta[0], &theta_dot[0]);
     response_move(response, period, &theta[1], &theta_dot[1]);

@@ -6,27 +6,13 @@
 #define FILTER_GRIP_H
 
 #include "filter/cdkf.h"
-#include "filter/considered.h"
-#include "math/factor.h"
 
-/* Process noise of a step. The walk q of theta_dot, integrated by theta, has the covariance q^2 [T^3/3, T^2/2; T^2/2, T]
- * (van Loan 1978); theta may walk itself. */
+/* Process noise of a step. */
 typedef struct step_noise {
     float variance; /* of theta_dot [rad^2/s^2]; theta has T/2 of it in common */
     float angle;    /* of theta beside that [rad^2] */
     float second;   /* sum of the squares of the second differences along the parameters [rad^2/s^2] */
 } step_noise_t;
-
-static inline step_noise_t step_noise(const cdkf_t *cdkf, const model_response_t *response, float period)
-{
-    const float walk = cdkf->process_noise[1] + cdkf->disturbance;
-    const float variance = walk * walk * period;
-    const float own = cdkf->process_noise[0] * cdkf->process_noise[0] * period;
-    const float *second = response->second_difference;
-    const step_noise_t noise = {variance, (variance * (period * period * 0.0833333333f)) + own,
-        (SIGMA_SECOND * SIGMA_SECOND) * factor_dot_three(second, second)};
-    return noise;
-}
 
 typedef struct grip_seen {
     float row[MODEL_PARAMETERS]; /* of the columns of S_xw and S_ww, */
@@ -44,7 +30,8 @@ void grip_see(const cdkf_t *cdkf, const model_response_t *response, const float 
     const cdkf_grip_t *grip, float period, grip_seen_t *seen);
 
 /* Line 5 for the state, conditioned on the force; false when it is too far from what is expected. */
-bool grip_predict_state_columns(cdkf_t *cdkf, const model_response_t *response, float period, grip_seen_t *seen);
+bool grip_predict_state_columns(
+    cdkf_t *cdkf, const model_response_t *response, const step_noise_t *noise, float period, grip_seen_t *seen);
 
 /* Corrects the rest of the belief. */
 void grip_take(cdkf_t *cdkf, const cdkf_grip_t *grip, const grip_seen_t *seen);

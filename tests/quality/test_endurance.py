@@ -25,7 +25,10 @@ SECONDS = 3600
 LINES_A_SECOND = 10
 
 FOLDER = Path(__file__).with_name("endurance")
-FACADE = [tools.FIRMWARE / "app" / name for name in ("lever.c", "link.c", "link_out.c", "recorder.c", "state.c")]
+FACADE = [
+    tools.FIRMWARE / "app" / f"{name}.c"
+    for name in ("lever", "instance", "bounce", "link", "link_out", "recorder", "state")
+]
 """Not built in double precision: the instance of the façade, and its state in bytes, have room for floats only."""
 
 

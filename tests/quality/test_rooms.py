@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import graphlib
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -157,3 +159,22 @@ def test_a_wrong_import_is_found(file: str, line: str, tmp_path: Path) -> None:
     text = f"def late():\n{line}\n" if line[0] == " " else line
     (tmp_path / PACKAGES[file.split("/")[0]] / file).write_text(text)
     assert len(wrong_imports(tmp_path)) == 1
+
+
+def included() -> dict[str, set[str]]:
+    """Return, for each module of the core (header and source together, "app/link"), the modules that it includes."""
+    modules: dict[str, set[str]] = {}
+    for folder in tools.CORE:
+        for file in (tools.FIRMWARE / folder).glob("*.[ch]"):
+            name = f"{folder}/{file.stem}"
+            found = re.findall(r'^#include "(\w+/\w+)\.h"', file.read_text(encoding="utf-8"), re.MULTILINE)
+            modules.setdefault(name, set()).update(set(found) - {name})
+    return modules
+
+
+def test_no_circle_of_includes_in_the_core() -> None:
+    """A module may be read, and tested, with those below it alone."""
+    try:
+        graphlib.TopologicalSorter(included()).prepare()
+    except graphlib.CycleError as circle:
+        pytest.fail(f"a circle: {' <- '.join(circle.args[1])}", pytrace=False)

@@ -39,7 +39,7 @@ def cell(text: str) -> str:
     words = re.sub(r"ON\(EVIDENCE_(\w+)\)", r"\1", text)
     words = re.sub(r"^(EVIDENCE|VERDICT|LEVER_FAULT)_", "", words).replace(" |", ",")
     number = re.fullmatch(r"(-?[\d.]+)f", words)
-    return {"NOTHING": "", "0": "", "0u": "", "1": "yes"}.get(
+    return {"NOTHING": "", "NEVER": "", "0": "", "0u": "", "1": "yes", "ALWAYS": "yes"}.get(
         words, f"{float(number[1]):g}" if number else words.lower()
     )
 

@@ -1,5 +1,6 @@
 /* An aircraft beside the estimator: which one is taken, what the bus says of it, and what carries its margin. */
 #include "app/instance.h"
+#include "app/link.h"
 #include "frames.h"
 
 #include <math.h>
@@ -250,7 +251,7 @@ TEST(each_fault_of_sensors_or_model_takes_the_margin_away)
         lever->estimator.faults = fault[i];
         lever->estimator.learning.verdict = (uint8_t)((i == 6u) ? VERDICT_HANDS_OFF : VERDICT_LEARNING);
         lever->bounce.time_us -= 1000000u;
-        instance_watch(lever);
+        bounce_watch(&lever->bounce, &lever->estimator, lever->link.publish_us);
         TEST_ASSERT_EQUAL(i < 7u, stability().state == (uint8_t)LEVER_BOUNCE_UNKNOWN);
     }
 }

@@ -1,6 +1,7 @@
 /* Frames to send: which, in what order, how often, protected how; that they say what the estimate says, and what may
  * be used. */
 #include "app/instance.h"
+#include "app/link.h"
 #include "frames.h"
 
 #include <math.h>

@@ -304,7 +304,7 @@ TEST(each_fault_of_sensors_clock_or_hands_closes_it)
     for (uint32_t i = 0u; i < 4u; i++) {
         lever->estimator.faults = fault[i];
         lever->estimator.learning.verdict = (uint8_t)((i == 2u) ? VERDICT_HANDS_OFF : VERDICT_LEARNING);
-        instance_mitigate(lever);
+        bounce_mitigate(&lever->bounce, &lever->estimator, &lever->gate, &lever->to_gate);
         TEST_ASSERT_EQUAL(i == 3u, lever->bounce.mitigation.open);
     }
 }

@@ -1,33 +1,52 @@
 /* The table of verdicts, cell by cell, and that it is in order of priority. */
 #include "app/verdict.h"
+#include "lever_cdkf.h"
 
 #include "test.h"
 
-enum { CELLS = 7 };
+/* The faults that forbid an action. */
+#define NEVER UINT32_MAX
+#define ALWAYS 0u
+#define RUNNING ((uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED)
+#define SOUND (RUNNING | (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_BOUND)
 
-/* learn, adapt, torque, correction, margin, on entry, on exit. */
-static const uint8_t expected[VERDICT_COUNT][CELLS] = {[VERDICT_MOTOR_WRONG] = {0, 0, 0, 1, 1, ACTION_RESTORE, 0},
-    [VERDICT_HANDS_OFF] = {0, 0, 0, 0, 0, ACTION_RESTORE, ACTION_OPEN},
-    [VERDICT_SENSOR_WRONG] = {0, 0, 1, 1, 1, ACTION_RESTORE, 0},
-    [VERDICT_NOISE] = {0, 0, 1, 1, 1, ACTION_RESTORE, 0},
-    [VERDICT_BLIND] = {0, 0, 1, 1, 1, 0, 0},
-    [VERDICT_SETTLING] = {0, 0, 1, 1, 1, 0, 0},
-    [VERDICT_REST] = {0, 0, 1, 1, 1, 0, 0},
-    [VERDICT_REGRIP] = {0, 0, 1, 1, 1, ACTION_INFLATE, ACTION_LEVELS},
-    [VERDICT_NEW] = {1, 0, 1, 1, 1, 0, 0},
-    [VERDICT_LEARNING] = {1, 1, 1, 1, 1, 0, 0}};
+static const verdict_row_t expected[VERDICT_COUNT] = {
+    /* evidence (tested below), learn, adapt, torque, correction, margin, on entry, on exit */
+    [VERDICT_MOTOR_WRONG] = {0u, false, false, NEVER, RUNNING, SOUND, ACTION_RESTORE, 0u},
+    [VERDICT_HANDS_OFF] = {0u, false, false, NEVER, NEVER, NEVER, ACTION_RESTORE, ACTION_OPEN},
+    [VERDICT_SENSOR_WRONG] = {0u, false, false, ALWAYS, RUNNING, SOUND, ACTION_RESTORE, 0u},
+    [VERDICT_NOISE] = {0u, false, false, ALWAYS, RUNNING, SOUND, ACTION_RESTORE, 0u},
+    [VERDICT_BLIND] = {0u, false, false, ALWAYS, RUNNING, SOUND, 0u, 0u},
+    [VERDICT_SETTLING] = {0u, false, false, ALWAYS, RUNNING, SOUND, 0u, 0u},
+    [VERDICT_REST] = {0u, false, false, ALWAYS, RUNNING, SOUND, 0u, 0u},
+    [VERDICT_REGRIP] = {0u, false, false, ALWAYS, RUNNING, SOUND, ACTION_INFLATE, ACTION_LEVELS},
+    [VERDICT_NEW] = {0u, true, false, ALWAYS, RUNNING, SOUND, 0u, 0u},
+    [VERDICT_LEARNING] = {0u, true, true, ALWAYS, RUNNING, SOUND, 0u, 0u}};
 
 void setUp(void)
 {
+}
+
+/* With each fault by itself, and with none: `forbidding` is expected. */
+static void check_action(uint32_t forbidding, uint32_t cell)
+{
+    TEST_ASSERT_EQUAL(forbidding != NEVER, verdict_permits(cell, 0u));
+    for (uint32_t fault = 1u; fault <= (uint32_t)LEVER_FAULT_HANDS_OFF; fault <<= 1u) {
+        TEST_ASSERT_EQUAL((forbidding & fault) == 0u, verdict_permits(cell, fault));
+    }
 }
 
 TEST(every_cell_is_what_is_meant)
 {
     for (uint32_t i = 0u; i < (uint32_t)VERDICT_COUNT; i++) {
         const verdict_row_t *row = &verdict_rows[i];
-        const uint8_t cell[CELLS] = {row->learn ? 1u : 0u, row->adapt ? 1u : 0u, row->torque ? 1u : 0u,
-            row->correction ? 1u : 0u, row->margin ? 1u : 0u, row->entry, row->exit};
-        TEST_ASSERT_EQUAL_UINT8_ARRAY(expected[i], cell, CELLS);
+        TEST_ASSERT_EQUAL(expected[i].learn, row->learn);
+        TEST_ASSERT_EQUAL(expected[i].adapt, row->adapt);
+        check_action(expected[i].torque, row->torque);
+        check_action(expected[i].correction, row->correction);
+        check_action(expected[i].margin, row->margin);
+        TEST_ASSERT_EQUAL_UINT8(expected[i].entry, row->entry);
+        TEST_ASSERT_EQUAL_UINT8(expected[i].exit, row->exit);
     }
 }
 
