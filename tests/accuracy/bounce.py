@@ -22,9 +22,9 @@ if __name__ == "__main__":
 
 from accuracy import tables  # noqa: E402
 from accuracy.tables import Place  # noqa: E402
+from lever_cdkf.cli.progress import Progress  # noqa: E402
 from lever_cdkf.errors import LeverError  # noqa: E402
-from lever_cdkf.files import write_text  # noqa: E402
-from lever_cdkf.progress import Progress  # noqa: E402
+from lever_cdkf.runtime.files import write_text  # noqa: E402
 from lever_sil.bounce import campaign  # noqa: E402
 from lever_sil.bounce.conditions import BETWEEN, CONDITIONS, FALSE, SPOILT, STATED  # noqa: E402
 from lever_sil.bounce.measure import FIGURES  # noqa: E402

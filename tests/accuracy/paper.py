@@ -21,10 +21,10 @@ if __name__ == "__main__":
 
 from accuracy import tables  # noqa: E402
 from accuracy.tables import Place  # noqa: E402
+from lever_cdkf.cli.progress import Progress  # noqa: E402
+from lever_cdkf.cli.tables import Row  # noqa: E402
 from lever_cdkf.errors import LeverError  # noqa: E402
-from lever_cdkf.files import write_text  # noqa: E402
-from lever_cdkf.progress import Progress  # noqa: E402
-from lever_cdkf.tables import Row  # noqa: E402
+from lever_cdkf.runtime.files import write_text  # noqa: E402
 from lever_sil.run import seeds  # noqa: E402
 from lever_sil.study import no_accelerometer  # noqa: E402
 from lever_sil.study.compare import campaign, paper, protocols  # noqa: E402

@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import LeverError
-from ..extras import require
-from ..unheard import unheard
+from ..runtime.extras import require
+from ..runtime.quiet_asammdf import unheard
 from . import identifiers
 from .bulk import ERROR, EXTENDED, FD, FRAME, LONGEST_LINE, REMOTE, Buses, Frames, parse
 

@@ -10,26 +10,26 @@ from typing import Protocol
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..can import codec
 from ..can.bulk import FRAME, RECORDED, SLOTS, Feeder, Frames, Rows
+from ..can.estimator_frames import Traffic
 from ..can.identity import Identity
 from ..can.logs import Recording
-from ..can.traffic import Traffic
 from ..exports.signal_files import calendar
-from ..extras import missing
-from ..files import Outputs, write_text
 from ..firmware.aircraft import AircraftResponse
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
-from ..provenance import printable, provenance
+from ..numeric.arrays import FloatArray
 from ..report import write_page
 from ..results import summary as summaries
 from ..results.faults import OPTIONAL
 from ..results.summary import RecordingSummary, ReplaySummary
 from ..results.trace import Trace
+from ..runtime.extras import missing
+from ..runtime.files import Outputs, write_text
+from ..runtime.provenance import printable, provenance
+from ..signals.mapped_frames import MappedTraffic
 from ..signals.reading import Reading
-from ..signals.traffic import MappedTraffic
 from .columns import Columns, model_numbers
 from .commands_in_log import Commands
 from .comparison import Comparison

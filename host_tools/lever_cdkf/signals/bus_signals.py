@@ -21,8 +21,8 @@ from e2e.p05 import e2e_p05_check
 from ..can.bulk import ERROR, EXTENDED, FD, REMOTE, Frames
 from ..can.logs import LogError, Recording
 from ..errors import LeverError
-from ..near_names import near_names
 from ..results.summary import MessageCounts
+from ..text.suggestions import near_names
 from .mapping import Protection
 from .recorded import Signal
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import LeverError
+from ..numeric.derivative import slope_ratio
 from ..results.summary import MappedSignal
-from ..slope import slope_ratio
-from ..units import GRAVITY
+from ..text.units import GRAVITY
 from .mapping import Source
 from .recorded import Signal
 from .resample import Samples, sample

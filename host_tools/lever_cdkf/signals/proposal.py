@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..errors import LeverError
-from ..slope import STEP, slope_likeness, slope_ratio, together
-from ..units import GRAVITY
+from ..numeric.arrays import FloatArray
+from ..numeric.derivative import STEP, slope_likeness, slope_ratio, together
+from ..text.units import GRAVITY
 from .mapping import Mapping, Source
 from .recorded import Signal
 from .units import INPUTS, factor, fitting, is_unit, likely

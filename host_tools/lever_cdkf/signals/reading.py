@@ -7,16 +7,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ..can.estimator_frames import LATE
 from ..can.logs import Recording
-from ..can.traffic import LATE
 from ..errors import LeverError
-from ..near_names import near_names
 from ..results.summary import Mapped, MessageCounts
+from ..text.suggestions import near_names
 from .bus_signals import BusSignals, find, load_database
 from .clock import RunningClock
 from .inputs import Input, recorded_samples, understood
 from .mapping import Mapping
-from .own import own_mapping
+from .named_columns import own_mapping
 from .recorded import Signal, notes_of
 from .resample import Samples
 from .tables import is_table, read_table

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
 from ..can import codec, logs
-from ..can.traffic import Traffic, why_refused
+from ..can.estimator_frames import Traffic, why_refused
 from ..errors import LeverError
 from ..firmware.config import Config, setting
 from ..firmware.estimator import Health
 from ..firmware.innovations import FRAME, samples_of
+from ..numeric.arrays import Array
+from ..signals.mapped_frames import MappedTraffic
 from ..signals.reading import Reading
-from ..signals.traffic import MappedTraffic
 
 _SAMPLES = ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")
 

@@ -9,10 +9,10 @@ from ..can.bulk import Buses, Feeder, Frames
 from ..firmware.aircraft import AircraftResponse
 from ..firmware.config import Config
 from ..firmware.estimator import FRAME_SAMPLE, Estimator
+from ..signals.mapped_frames import MappedTraffic
 from ..signals.online import Online
 from ..signals.reading import Reading
 from ..signals.resample import at_period
-from ..signals.traffic import MappedTraffic
 from .sources import BusSource, LogSource
 
 

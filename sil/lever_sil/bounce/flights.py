@@ -10,9 +10,9 @@ from itertools import accumulate
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.firmware.aircraft import AircraftResponse
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.numeric.arrays import FloatArray
+from lever_cdkf.text.units import GRAVITY
 from numpy.typing import NDArray
 
 from ..aircraft.aircraft import Aircraft

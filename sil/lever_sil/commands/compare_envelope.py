@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 
+from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.progress import Progress
+from lever_cdkf.cli.tables import Row, print_tables, write_json
 from lever_cdkf.errors import LeverError
-from lever_cdkf.layout import say
-from lever_cdkf.progress import Progress
-from lever_cdkf.tables import Row, print_tables, write_json
 
 from ..envelope import conditions
 from ..study.peers import campaign, tables

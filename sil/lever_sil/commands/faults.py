@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.files import json_text, make_folder, write_texts
-from lever_cdkf.layout import say
-from lever_cdkf.progress import Progress
+from lever_cdkf.runtime.extras import require
+from lever_cdkf.runtime.files import json_text, make_folder, write_texts
 
 from .names import check_names
 
@@ -69,7 +69,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """`lever faults`."""
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
 
     from ..faults import matrix, table
     from ..faults.rows import ROWS
@@ -99,7 +99,7 @@ def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> N
     """Write the files that were asked for."""
     from dataclasses import asdict
 
-    from lever_cdkf.provenance import provenance, with_provenance
+    from lever_cdkf.runtime.provenance import provenance, with_provenance
 
     from ..faults import faults_page, table
 

@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from lever_cdkf.cli.layout import say
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.files import check_writable, json_text, make_folder, write_texts
-from lever_cdkf.layout import say
+from lever_cdkf.runtime.extras import require
+from lever_cdkf.runtime.files import check_writable, json_text, make_folder, write_texts
 
 from .names import check_names
 
@@ -84,8 +84,8 @@ class JudgedCommand(ABC, Generic[Row]):
 
     def run(self, args: argparse.Namespace) -> int:
         """Return the sub-command."""
-        from lever_cdkf.progress import Progress
-        from lever_cdkf.tables import print_tables
+        from lever_cdkf.cli.progress import Progress
+        from lever_cdkf.cli.tables import print_tables
 
         from ..judged import table
 
@@ -118,7 +118,7 @@ class JudgedCommand(ABC, Generic[Row]):
         """Write the files that were asked for."""
         from dataclasses import asdict
 
-        from lever_cdkf.provenance import provenance, with_provenance
+        from lever_cdkf.runtime.provenance import provenance, with_provenance
 
         from ..judged import table
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.can import buses
 from lever_cdkf.can.buses import add_bus_options, chosen_options
+from lever_cdkf.cli.formats import FORMATS, add_format_option, chosen_formats
+from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.tables import Row, Tables, add_json_option
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.formats import FORMATS, add_format_option, chosen_formats
-from lever_cdkf.layout import say
-from lever_cdkf.tables import Row, Tables, add_json_option
+from lever_cdkf.runtime.extras import require
 
 if TYPE_CHECKING:
     import can
@@ -158,8 +158,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _simulate_seeds(args: argparse.Namespace, overrides: Sequence[str]) -> int:
     """`lever sim --seeds`."""
-    from lever_cdkf.progress import Progress
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.progress import Progress
+    from lever_cdkf.cli.tables import print_tables
 
     from ..run import seeds
     from ..scenarios.scenario import load
@@ -216,7 +216,7 @@ def run_demo(args: argparse.Namespace) -> int:
 
 
 def _list(json_file: str | None) -> int:
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
 
     from ..scenarios.scenario import load, names
 
@@ -236,8 +236,8 @@ def _simulate(
     args: argparse.Namespace,
     story: Callable[[], Story] | None = None,
 ) -> int:
-    from lever_cdkf.progress import Progress
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.progress import Progress
+    from lever_cdkf.cli.tables import print_tables
 
     from ..run.runner import simulate
 

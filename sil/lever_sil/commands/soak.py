@@ -8,11 +8,11 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.files import check_writable, json_text, write_texts
-from lever_cdkf.layout import say
-from lever_cdkf.progress import Progress
+from lever_cdkf.runtime.extras import require
+from lever_cdkf.runtime.files import check_writable, json_text, write_texts
 
 if TYPE_CHECKING:
     from ..soak.soak import Result
@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
     """`lever soak`."""
     from dataclasses import asdict
 
-    from lever_cdkf.provenance import provenance, with_provenance
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
+    from lever_cdkf.runtime.provenance import provenance, with_provenance
 
     from ..soak import soak, soak_page
 

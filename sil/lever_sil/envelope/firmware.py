@@ -9,11 +9,11 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.estimator import Estimator, feed, make_command
 from lever_cdkf.firmware.library import ffi, struct_dtype
 from lever_cdkf.firmware.library import lib as firmware_lib
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from ..fast.library import Struct, lib

@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
 
 from ..fast import plants as fast_plants
 from ..plants import lever_plant, mayo_plant, two_dof_plant

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import BoolArray, FloatArray
+from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 
 from .motions import PERIOD, Recording, columns, stream
 

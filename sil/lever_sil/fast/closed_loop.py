@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.can import codec
 from lever_cdkf.can.commander import Commander
 from lever_cdkf.errors import LeverError
@@ -16,6 +15,7 @@ from lever_cdkf.firmware import quantities
 from lever_cdkf.firmware.aircraft import AircraftResponse
 from lever_cdkf.firmware.estimator import Estimator, Recorder, make_command
 from lever_cdkf.firmware.library import ffi, struct_dtype
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from ..aircraft.flight import Flight

@@ -8,10 +8,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.estimator import Estimator
 from lever_cdkf.firmware.library import struct_dtype
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from ..envelope.firmware import MOTOR_LAG

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from lever_cdkf.tables import Row
+from lever_cdkf.cli.tables import Row
 
 from . import judge
 from .matrix import Result

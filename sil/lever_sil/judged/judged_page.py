@@ -5,10 +5,10 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 
+from lever_cdkf.cli.tables import Row
 from lever_cdkf.report.figure import Figure
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table
-from lever_cdkf.tables import Row
 
 from .result import Result
 from .table import MISSED, figures, lines, state

@@ -25,9 +25,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.models.transfer import Transfer
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.numeric.arrays import FloatArray
+from lever_cdkf.text.units import GRAVITY
 from numpy.typing import NDArray
 
 from . import truth as truths

@@ -18,11 +18,11 @@ from dataclasses import dataclass, field
 
 import can
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.can import codec
 from lever_cdkf.can.commander import ACCEPTED, SEQUENCE, Commander, refusal, result_of
 from lever_cdkf.can.identity import Identity
 from lever_cdkf.errors import LeverError, SettingsError
+from lever_cdkf.numeric.arrays import FloatArray
 
 from ..aircraft.flight import Flight
 from ..fast.closed_loop import Traffic

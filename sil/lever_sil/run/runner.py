@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 import can
 import numpy as np
 from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.cli.formats import FORMATS
 from lever_cdkf.errors import LeverError
 from lever_cdkf.exports.signal_files import SignalFiles
-from lever_cdkf.extras import missing
-from lever_cdkf.files import Outputs, make_folder, write_text, writing
-from lever_cdkf.formats import FORMATS
-from lever_cdkf.provenance import provenance
 from lever_cdkf.results.summary import SimulationSummary, text
 from lever_cdkf.results.trace import Trace
+from lever_cdkf.runtime.extras import missing
+from lever_cdkf.runtime.files import Outputs, make_folder, write_text, writing
+from lever_cdkf.runtime.provenance import provenance
 from numpy.typing import NDArray
 
 from ..scenarios.scenario import Scenario

@@ -17,17 +17,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.errors import SettingsError
 from lever_cdkf.firmware import quantities
 from lever_cdkf.firmware.aircraft import AircraftResponse
 from lever_cdkf.firmware.config import CHOICES, Setting
 from lever_cdkf.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.firmware.settings_file import setting_value
-from lever_cdkf.near_names import near_names
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_cdkf.results.trace import CONVERGED_AFTER
-from lever_cdkf.toml_text import MOST_NESTED
-from lever_cdkf.units import UnitError
+from lever_cdkf.text.suggestions import near_names
+from lever_cdkf.text.toml_text import MOST_NESTED
+from lever_cdkf.text.units import UnitError
 
 from ..aircraft.aircraft import Coupled, read_aircraft
 from ..aircraft.response_table import known_response

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator
 from lever_cdkf.firmware.library import lib
+from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from lever_cdkf.report.series import runs
 from numpy.typing import NDArray
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import html
 
 import numpy as np
+from lever_cdkf.cli.tables import Row
 from lever_cdkf.report.figure import SERIES, Figure, axis, line
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table
-from lever_cdkf.tables import Row
 
 from .soak import QUANTITIES, Result
 

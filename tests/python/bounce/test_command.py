@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_sil.bounce import bounce_page, campaign, conditions
 from lever_sil.bounce.conditions import CONDITIONS, Condition
 from lever_sil.bounce.flights import FIVE
@@ -19,7 +19,7 @@ from python.conftest import Refused
 
 def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = ["--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]
-    status = cli.main(["bounce", "--quick", "--seeds", "1", *files])
+    status = main(["bounce", "--quick", "--seeds", "1", *files])
     printed = capsys.readouterr().out
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
     written = (tmp_path / "bounce.html").read_text(encoding="utf-8")
@@ -60,7 +60,7 @@ def test_pilots_may_fly_the_aircraft_in_turn(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_the_list_names_every_condition(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["bounce", "--list"]) == 0
+    assert main(["bounce", "--list"]) == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in conditions.CONDITIONS)
 

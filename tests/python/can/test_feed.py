@@ -10,8 +10,8 @@ import pytest
 from lever_cdkf.can import bulk, codec, fields
 from lever_cdkf.can.bulk import Feeder
 from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.can.estimator_frames import Traffic, read_samples
 from lever_cdkf.can.logs import LogError, Recording
-from lever_cdkf.can.traffic import Traffic, read_samples
 from lever_cdkf.firmware.estimator import Estimator, Health, run_samples
 from python.conftest import Session
 

@@ -219,7 +219,7 @@ STREAM_MB = 50
 COUNTING = """
 import resource, sys
 from lever_cdkf.can.logs import Recording
-from lever_cdkf.can.traffic import Traffic
+from lever_cdkf.can.estimator_frames import Traffic
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 traffic = Traffic(Recording([sys.argv[1]]))
 ours = sum(len(frames) for frames in traffic.chunks())

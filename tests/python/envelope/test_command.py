@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import Config
 from lever_sil.envelope import campaign, conditions, envelope_page, firmware, rules
 from lever_sil.envelope.condition import ClosedLoop, Condition
@@ -31,7 +31,7 @@ QUICK = {
 def test_the_reduced_table_holds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], record_property: Callable[[str, object], None]
 ) -> None:
-    status = cli.main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
+    status = main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
     written = (tmp_path / "envelope.html").read_text(encoding="utf-8")
@@ -110,7 +110,7 @@ def test_the_firmware_dithers_the_lever_while_samples_are_lost(whole: bool) -> N
 
 @pytest.mark.usefixtures("short")
 def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["envelope", "--seeds", "2", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]) == 1
+    assert main(["envelope", "--seeds", "2", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]) == 1
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
     assert {name: row["ok"] for name, row in rows.items()} == {"missed": False, "unknown": False, "reported": True}
     assert rows["unknown"]["measured"] == {"f_n rms [%]": None}
@@ -177,7 +177,7 @@ def test_bad_input_is_one_line(arguments: list[str], words: tuple[str, ...], ref
 
 
 def test_the_list_names_every_condition(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["envelope", "--list"]) == 0
+    assert main(["envelope", "--list"]) == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in (*conditions.CONDITIONS, *rules.RULES))
 
@@ -193,6 +193,6 @@ def test_the_list_names_every_condition(capsys: pytest.CaptureFixture[str]) -> N
 )
 def test_a_table_of_its_own_runs_where_it_is_named(tmp_path: Path, named: Sequence[str], ran: list[str]) -> None:
     only = ("--only", *named) if named else ()
-    cli.main(["envelope", *only, "--seeds", "1", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
+    main(["envelope", *only, "--seeds", "1", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     rows = json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]
     assert [row["name"] for row in rows] == ran

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.firmware.config import Config, settings_table
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator, feed
+from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
 from lever_sil.envelope import firmware, measure, motions, pilots, plant
 from lever_sil.envelope.firmware import RESPONSE_STRIDE, Feedthrough, Track
 from lever_sil.envelope.measure import FIGURES, Outcome, fault_mask

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.library import lib
 from lever_sil.envelope import firmware
@@ -110,7 +110,7 @@ def test_longest() -> None:
 def test_the_command_writes_its_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "rows.json"
     only = ["--only", "theta_stuck", "foreign_load", "--seeds", "1"]
-    assert cli.main(["faults", *only, "--json", str(file), "--out", str(tmp_path)]) == 0
+    assert main(["faults", *only, "--json", str(file), "--out", str(tmp_path)]) == 0
     content = json.loads(file.read_text(encoding="utf-8"))
     assert [row["name"] for row in content["rows"]] == ["theta_stuck", "foreign_load"]
     assert content["count"] == 2

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
-from lever_cdkf.arrays import Array
+from lever_cdkf.cli.main import main
 from lever_cdkf.errors import LeverError
+from lever_cdkf.numeric.arrays import Array
 from lever_sil.study.baselines import BASELINES
 from lever_sil.study.candidate import Config, Sample, candidate
 from lever_sil.study.compare import campaign, dataset, entrants, evaluation
@@ -175,7 +175,7 @@ def test_move_is_the_step_of_the_batch() -> None:
 def test_the_command_says_what_does_not_go_together(
     words: tuple[str, ...], says: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["compare", *words]) == 2
+    assert main(["compare", *words]) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert says in line
 

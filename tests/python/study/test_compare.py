@@ -14,11 +14,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from lever_cdkf import interrupts
 from lever_cdkf.firmware.config import setting
 from lever_cdkf.firmware.native import enum_names, settings_table
-from lever_cdkf.provenance import provenance
 from lever_cdkf.report import figure as drawing
+from lever_cdkf.runtime import interrupts
+from lever_cdkf.runtime.provenance import provenance
 from lever_sil.scenarios import scenario
 from lever_sil.study.baselines import BASELINES
 from lever_sil.study.compare import (

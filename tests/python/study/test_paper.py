@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.config import setting
+from lever_cdkf.numeric.arrays import Array
 from lever_sil.study.baselines.algorithm1 import ParameterFilter
 from lever_sil.study.compare import campaign, paper
 from lever_sil.study.compare.cases import Plan, cases

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_sil.envelope import conditions
 from lever_sil.envelope.condition import ClosedLoop, Condition
 from lever_sil.envelope.measure import FIGURES, Outcome
@@ -175,7 +175,7 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     monkeypatch.setattr(conditions, "CONDITIONS", {"short": short, "slow": slow})
     file = tmp_path / "peers.json"
     quick = ("compare", "--envelope", "--quick", "--seeds", "2", "--jobs", "1", "--json", str(file))
-    assert cli.main(quick) == 0
+    assert main(quick) == 0
     printed = capsys.readouterr().out
     assert "Too few runs for a verdict" in printed
     written = json.loads(file.read_text())["peers"]
@@ -198,6 +198,6 @@ def test_what_is_wrong_is_one_line(arguments: tuple[str, ...], said: str, refuse
 
 
 def test_list(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(("compare", "--envelope", "--list")) == 0
+    assert main(("compare", "--envelope", "--list")) == 0
     out = capsys.readouterr().out
     assert all(name in out for name in (*conditions.CONDITIONS, *ESTIMATORS))

@@ -13,8 +13,8 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from lever_cdkf import interrupts
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
+from lever_cdkf.runtime import interrupts
 from numpy.typing import NDArray
 
 from ..data import PARAMETERS, Batch, Estimates

@@ -8,7 +8,7 @@ from itertools import cycle, groupby
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.report.figure import SERIES, Figure, Spec, axis, band, dots, line
 
 from ..baselines import BASELINES

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from lever_cdkf.arrays import Array, BoolArray
+from lever_cdkf.numeric.arrays import Array, BoolArray
 
 from ..data import OUTPUTS, PARAMETERS
 from ..matched import KINDS

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
-from lever_cdkf.tables import Cell, Row
+from lever_cdkf.cli.tables import Cell, Row
+from lever_cdkf.numeric.arrays import Array
 
 from ..data import PARAMETERS
 from ..scores import settling_times

@@ -7,8 +7,8 @@ questions are the same.
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.arrays import Array
-from lever_cdkf.tables import Row
+from lever_cdkf.cli.tables import Row
+from lever_cdkf.numeric.arrays import Array
 
 from ..data import PARAMETERS, Batch
 from ..scores import settling_times

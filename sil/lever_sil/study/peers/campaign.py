@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf import interrupts
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
+from lever_cdkf.runtime import interrupts
 
 from ...envelope import conditions
 from ...envelope.condition import Condition

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.config import settings_table
 from lever_cdkf.firmware.library import lib
 from lever_cdkf.models.lever import Lever
+from lever_cdkf.numeric.arrays import Array
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from ...envelope.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track

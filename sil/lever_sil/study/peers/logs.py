@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.errors import SettingsError
 from lever_cdkf.firmware.config import Config
+from lever_cdkf.numeric.arrays import Array
 
 from ...envelope import firmware, pilots, plant
 from ...envelope.condition import ClosedLoop, Condition

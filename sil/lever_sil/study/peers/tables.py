@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import groupby
 
 import numpy as np
-from lever_cdkf.tables import Row
+from lever_cdkf.cli.tables import Row
 
 from ..compare.comparison import LEAST_RUNS, Differences, corrected, of_errors
 from .campaign import ESTIMATORS, FIRMWARE, Result

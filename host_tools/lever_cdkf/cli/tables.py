@@ -7,9 +7,9 @@ import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
 
-from .files import json_text, write_text
+from ..runtime.files import json_text, write_text
+from ..runtime.provenance import provenance
 from .layout import UNLIMITED, terminal_width, wrapped
-from .provenance import provenance
 from .table_layout import Column, table_lines, upright_lines
 
 Cell = str | float | bool | None

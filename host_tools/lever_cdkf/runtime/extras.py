@@ -7,7 +7,7 @@ import shlex
 import sys
 from collections.abc import Iterable, Sequence
 
-from .errors import LeverError
+from ..errors import LeverError
 
 PACKAGES = {
     "campaign": ("dask", "distributed", "pyarrow", "plotly", "matplotlib", "scipy"),

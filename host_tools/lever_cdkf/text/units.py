@@ -10,8 +10,8 @@ import math
 import re
 from functools import cache
 
-from .errors import LeverError
-from .files import native_file
+from ..errors import LeverError
+from ..runtime.files import native_file
 
 GRAVITY = 9.80665
 """Standard gravity [m/s^2], the same number as in the firmware's model."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from .errors import LeverError
-from .extras import missing_of_file, require_for_file, warn_of_left_out
+from ..errors import LeverError
+from ..runtime.extras import missing_of_file, require_for_file, warn_of_left_out
 
 FORMATS = {"csv": "trace.csv", "mf4": "signals.mf4", "mcap": "signals.mcap", "parquet": "trace.parquet"}
 """And their files."""

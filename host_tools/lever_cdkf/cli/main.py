@@ -13,13 +13,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from . import interrupts
-from .errors import LeverError
-from .exit_status import INTERRUPTED, MESSAGE
-from .extras import hide_mf4, reveal_mf4
-from .files import check_writable
+from ..errors import LeverError
+from ..runtime import interrupts
+from ..runtime.exit_status import INTERRUPTED, MESSAGE
+from ..runtime.extras import hide_mf4, reveal_mf4
+from ..runtime.files import check_writable
+from ..runtime.provenance import version
 from .help_text import HelpFormatter
-from .provenance import version
 
 COMMANDS = "lever_cdkf.commands"
 """Entry point group of modules that hold sub-commands. Such a module has

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from .errors import LeverError
+from ..errors import LeverError
 from .files import native_file, shared_library
 
 SOFTWARE = "lever-cdkf"
@@ -124,8 +124,8 @@ def revision() -> str | None:
     import subprocess
 
     file = Path(__file__).resolve()
-    root = file.parents[2]
-    if file.parent.parent.name != "host_tools":
+    root = file.parents[3]
+    if file.parents[2].name != "host_tools":
         return _installed_revision()
     if not (root / ".git").exists():
         return None

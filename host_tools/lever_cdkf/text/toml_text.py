@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterable
 from typing import Any
 
-from .errors import LeverError
+from ..errors import LeverError
 
 if sys.version_info >= (3, 11):
     import tomllib

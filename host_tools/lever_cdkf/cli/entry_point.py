@@ -7,16 +7,16 @@ Imports next to nothing, for the same reason.
 try:
     import signal
 
-    from .exit_status import exit_at_once
+    from ..runtime.exit_status import exit_at_once
 except KeyboardInterrupt:
     raise SystemExit(130) from None
 
 
 def main() -> int:
-    """cli.main()."""
+    """Run main.main()."""
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not where it is ignored, as by nohup
         signal.signal(signal.SIGINT, exit_at_once)
-    from .cli import main
+    from .main import main
 
     status = main()
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -6,7 +6,7 @@ import sys
 import time
 from typing import Any
 
-from . import interrupts
+from ..runtime import interrupts
 
 PATIENCE = 2.0
 """[s] before anything is said."""

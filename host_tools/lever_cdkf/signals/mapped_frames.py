@@ -52,7 +52,7 @@ class Origin:
 
 
 class MappedTraffic:
-    """A can.traffic.Traffic of logs that do not speak lever.dbc."""
+    """A can.estimator_frames.Traffic of logs that do not speak lever.dbc."""
 
     def __init__(self, logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> None:
         """Read all of it. Raise LeverError."""

@@ -15,8 +15,8 @@ from typing import Any
 
 import lever_cdkf
 
+from ..errors import LeverError
 from . import interrupts
-from .errors import LeverError
 
 LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
 """Environment variable for development: folders (separated like PATH) that are searched before the installed files."""
