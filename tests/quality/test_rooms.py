@@ -51,21 +51,22 @@ MAY_IMPORT = {
         "exports",
     },
     "lever_sil/pilot_fmu": {"fast", "scenarios", "firmware", "fmu"},
-    "lever_sil/judged": {"cli", "report"},
-    "lever_sil/envelope": {"judged", "fast", "plants", "firmware", "models", "report"},
+    "lever_sil/batch": {"fast", "plants", "firmware", "models"},
+    "lever_sil/acceptance": {"cli", "report"},
+    "lever_sil/envelope": {"acceptance", "batch", "fast", "plants", "firmware", "models", "report"},
     "lever_sil/bounce": {
-        *("judged", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
+        *("acceptance", "batch", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
         *("firmware", "models", "report"),
     },
-    "lever_sil/faults": {"cli", "fast", "envelope", "firmware", "can", "report"},
+    "lever_sil/faults": {"cli", "batch", "fast", "envelope", "firmware", "can", "report"},
     "lever_sil/soak": {"cli", "fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
     "lever_sil/study": {
-        *("cli", "run", "fast", "scenarios", "plants", "envelope"),
+        *("cli", "run", "fast", "scenarios", "plants", "batch", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),
     },
     "lever_sil/campaign": {"cli", "fast", "run", "scenarios", "study", "firmware", "results", "report"},
     "lever_sil/commands": {
-        *("campaign", "run", "scenarios", "study", "judged", "envelope", "bounce", "faults", "soak", "aircraft"),
+        *("campaign", "run", "scenarios", "study", "acceptance", "envelope", "bounce", "faults", "soak", "aircraft"),
         *("cli", "firmware", "can", "report", "exports", "fmu", "pilot_fmu"),
     },
 }

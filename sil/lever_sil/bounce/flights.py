@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..aircraft.aircraft import Aircraft
 from ..aircraft.response_table import UNSURE, known_response
 from ..aircraft.stability import critical_gearing
-from ..envelope.motions import stream
+from ..batch.motions import stream
 from ..fast.closed_loop import Loop
 from ..plants.truth import Truth
 from ..scenarios import inputs as scenario_inputs

@@ -128,18 +128,18 @@ def _compare(args: argparse.Namespace) -> int:
     """Run all estimators that take part on all cases that were asked for."""
     from lever_cdkf.cli.tables import print_tables
 
-    from ..study.compare import campaign, entrants, evaluation, table, verdicts
+    from ..study.compare import entrants, evaluation, run_cases, table, verdicts
 
     if args.score is not None:
         entrants.enter(args.score)
     plan, names = _drawn(args) if args.data is None else _of_files(args)
-    todo = campaign.tasks(names, _estimators(args), plan)
+    todo = run_cases.tasks(names, _estimators(args), plan)
     if not todo:
         raise LeverError("none of these estimators takes part in any of these cases; see `lever compare --list`")
     if args.out is not None:
         make_folder(args.out)  # before a campaign that could then not be kept
     with Progress("compare") as progress:
-        results = campaign.run(todo, args.jobs, progress.show)
+        results = run_cases.run(todo, args.jobs, progress.show)
     rows = evaluation.judge(results)
     claims = verdicts.claims(rows) if results.plan.is_whole else []
     by_case = verdicts.verdicts(rows, *evaluation.compare(results, rows))
@@ -185,7 +185,7 @@ def _paper(args: argparse.Namespace) -> int:
     """Run `lever compare --paper`."""
     from lever_cdkf.cli.tables import print_tables
 
-    from ..study.compare import campaign, paper
+    from ..study.compare import paper, run_cases
     from ..study.compare.cases import Plan
 
     for option in ("scenarios", "models", "out", "quick", "score", "data"):
@@ -194,9 +194,9 @@ def _paper(args: argparse.Namespace) -> int:
     seeds = paper.SEEDS if args.seeds is None else args.seeds
     _check(seeds, args.duration, args.jobs)
     plan = Plan(seeds, args.duration, _SEED if args.seed is None else args.seed)
-    todo = campaign.tasks(paper.names(), args.estimators and _estimators(args), plan)
+    todo = run_cases.tasks(paper.names(), args.estimators and _estimators(args), plan)
     with Progress("compare") as progress:
-        results = campaign.run(todo, args.jobs, progress.show)
+        results = run_cases.run(todo, args.jobs, progress.show)
     print_tables(paper.tables(results), args.json)
     return 0
 

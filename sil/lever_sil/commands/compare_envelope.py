@@ -10,8 +10,8 @@ from lever_cdkf.cli.tables import Row, print_tables, write_json
 from lever_cdkf.errors import LeverError
 
 from ..envelope import conditions
-from ..study.peers import campaign, tables
-from ..study.peers.filters import PEERS
+from ..study.compare_envelope import run_estimators, tables
+from ..study.compare_envelope.filters import PEERS
 from .names import check_names
 
 SEEDS = 8
@@ -27,16 +27,16 @@ def run(args: argparse.Namespace) -> int:
         if getattr(args, name) is not None:
             raise LeverError(f"--{name} does not go with --envelope")
     check_names("condition", args.scenarios or (), conditions.CONDITIONS, "lever compare --envelope --list")
-    check_names("estimator", args.estimators or (), campaign.ESTIMATORS, "lever compare --envelope --list")
+    check_names("estimator", args.estimators or (), run_estimators.ESTIMATORS, "lever compare --envelope --list")
     wanted = args.scenarios or [name for name, one in conditions.CONDITIONS.items() if one.quick or not args.quick]
     seeds = args.seeds if args.seeds is not None else SEEDS
-    todo = campaign.tasks(
+    todo = run_estimators.tasks(
         [one for name, one in conditions.CONDITIONS.items() if name in wanted],
         seeds,
-        args.estimators or campaign.ESTIMATORS,
+        args.estimators or run_estimators.ESTIMATORS,
     )
     with Progress("compare") as progress:
-        results = campaign.run(todo, args.jobs, progress.show)
+        results = run_estimators.run(todo, args.jobs, progress.show)
     print_tables(tables.tables(results, seeds))
     for sentence in tables.verdicts(results):
         say(sentence)
@@ -47,7 +47,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _listed() -> dict[str, list[Row]]:
-    titles = {campaign.FIRMWARE: "as shipped, with the settings of the condition"}
+    titles = {run_estimators.FIRMWARE: "as shipped, with the settings of the condition"}
     titles |= {name: peer.title for name, peer in PEERS.items()}
     return {
         "conditions": [{"name": name, "title": one.title} for name, one in conditions.CONDITIONS.items()],

@@ -9,9 +9,9 @@ from lever_cdkf.firmware.estimator import DO_NOT_TRUST, fault_names
 from lever_cdkf.report.figure import Figure, axis, band, dots, line, time_axis
 from lever_cdkf.report.page import Page
 
-from ..judged import judged_page
-from .campaign import Result
+from ..acceptance import acceptance_page
 from .measure import Excerpt
+from .run_conditions import Result
 
 
 def build(results: Sequence[Result], seeds: int) -> str:
@@ -24,7 +24,7 @@ def build(results: Sequence[Result], seeds: int) -> str:
         "lever envelope",
     )
     charts = [None if result.excerpt is None else _chart(result.excerpt, result) for result in results]
-    return judged_page.build(page, results, charts, f"Flagged is any of {', '.join(fault_names(DO_NOT_TRUST))}.")
+    return acceptance_page.build(page, results, charts, f"Flagged is any of {', '.join(fault_names(DO_NOT_TRUST))}.")
 
 
 def _chart(shown: Excerpt, result: Result) -> Figure:

@@ -15,11 +15,11 @@ from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from lever_cdkf.report.series import runs
 from numpy.typing import NDArray
 
-from ..judged import result as judged
-from ..judged.result import Values, largest, mean
+from ..acceptance import result as judged
+from ..acceptance.result import Values, largest, mean
+from ..batch.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
+from ..batch.motions import Recording
 from .condition import FOLLOWED
-from .firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
-from .motions import Recording
 
 QUANTITIES = ("f_n", "zeta", *PARAMETERS)
 WRONG = 3.0

@@ -14,10 +14,10 @@ from lever_cdkf.firmware.library import struct_dtype
 from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
-from ..envelope.firmware import MOTOR_LAG
-from ..envelope.motions import PERIOD, STRIDE, Motion, columns, lanes, stream, truth
-from ..envelope.plant import Lanes, Plant, grip_force
-from ..envelope.sensors import GRIP_NOISE, NOISE
+from ..batch.firmware import MOTOR_LAG
+from ..batch.motions import PERIOD, STRIDE, Motion, columns, lanes, stream, truth
+from ..batch.plant import Lanes, Plant, grip_force
+from ..batch.sensors import GRIP_NOISE, NOISE
 from ..fast.library import Struct, lib
 from . import bus, readings
 from .bus import Bus, Interval

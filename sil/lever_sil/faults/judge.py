@@ -12,8 +12,8 @@ from lever_cdkf.firmware.library import enum_names, lib
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from lever_cdkf.report.series import runs
 
+from ..batch.motions import PERIOD, STRIDE
 from ..envelope.measure import QUANTITIES, fault_mask
-from ..envelope.motions import PERIOD, STRIDE
 from .bus import Interval
 from .flight import Record
 

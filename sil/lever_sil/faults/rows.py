@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from lever_cdkf.can import codec
 
-from ..envelope.motions import PERIOD, Motion
+from ..batch.motions import PERIOD, Motion
 from . import bus, readings
 from .bus import Interval
 from .judge import Must

@@ -12,11 +12,12 @@ import pytest
 from lever_cdkf.firmware.config import Config, settings_table
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator, feed
 from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
-from lever_sil.envelope import firmware, measure, motions, pilots, plant
-from lever_sil.envelope.firmware import RESPONSE_STRIDE, Feedthrough, Track
+from lever_sil.batch import firmware, motions, pilots, plant
+from lever_sil.batch.firmware import RESPONSE_STRIDE, Feedthrough, Track
+from lever_sil.batch.motions import Motion, Recording
+from lever_sil.batch.sensors import NOISE, Fault, Sensors, lost, measured
+from lever_sil.envelope import measure
 from lever_sil.envelope.measure import FIGURES, Outcome, fault_mask
-from lever_sil.envelope.motions import Motion, Recording
-from lever_sil.envelope.sensors import NOISE, Fault, Sensors, lost, measured
 from lever_sil.plants import lever_plant as sil_plant
 from lever_sil.plants.truth import Conditions
 from numpy.typing import NDArray

@@ -13,9 +13,9 @@ import pytest
 from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.library import lib
-from lever_sil.envelope import firmware
-from lever_sil.envelope.condition import ClosedLoop
-from lever_sil.envelope.motions import PERIOD, STRIDE
+from lever_sil.batch import firmware
+from lever_sil.batch.firmware import ClosedLoop
+from lever_sil.batch.motions import PERIOD, STRIDE
 from lever_sil.faults import bus, faults_page, judge, matrix, readings, table
 from lever_sil.faults.flight import Pilot, Record
 from lever_sil.faults.rows import KNOWN, MOTION, ROWS, TIME

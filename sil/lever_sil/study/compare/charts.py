@@ -13,10 +13,10 @@ from lever_cdkf.report.figure import SERIES, Figure, Spec, axis, band, dots, lin
 
 from ..baselines import BASELINES
 from ..scores import settling_times
-from .campaign import Results
 from .cases import cases
 from .entrants import OURS, entrants
 from .evaluation import FREQUENCY, Row, quantities
+from .run_cases import Results
 
 COLOURS = dict(zip((*OURS, *BASELINES), cycle(SERIES)))
 """Of an estimator, on all charts; that of the firmware has the same in all its settings."""

@@ -12,9 +12,9 @@ from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import number, table
 
 from . import charts
-from .campaign import Results
 from .cases import PRIOR, cases
 from .evaluation import Row
+from .run_cases import Results
 from .verdicts import Claim
 
 _ESTIMATORS = 6  # in a table

@@ -12,10 +12,10 @@ from lever_cdkf.numeric.arrays import Array
 
 from ..data import PARAMETERS
 from ..scores import settling_times
-from .campaign import Outcome, Results
 from .cases import Case, Paper, Plan, cases
 from .entrants import tuning_name, wrongly_tuned
 from .evaluation import FREQUENCY
+from .run_cases import Outcome, Results
 
 SEEDS = 20
 TUNING = ("wrong_tuning_fixed", "wrong_tuning_trim")

@@ -12,10 +12,10 @@ from lever_cdkf.numeric.arrays import Array
 
 from ..data import PARAMETERS, Batch
 from ..scores import settling_times
-from .campaign import Outcome, Results
 from .cases import SQUARE, Protocol, cases
 from .evaluation import FREQUENCY
 from .paper import pair
+from .run_cases import Outcome, Results
 
 SEEDS = 100
 SQUARE_WAVE = "square_wave"

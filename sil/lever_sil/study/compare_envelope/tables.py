@@ -10,8 +10,8 @@ import numpy as np
 from lever_cdkf.cli.tables import Row
 
 from ..compare.comparison import LEAST_RUNS, Differences, corrected, of_errors
-from .campaign import ESTIMATORS, FIRMWARE, Result
 from .filters import PEERS
+from .run_estimators import ESTIMATORS, FIRMWARE, Result
 
 
 def tables(results: Sequence[Result], seeds: int) -> dict[str, list[Row]]:

@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.cli.main import main
+from lever_sil.batch.firmware import ClosedLoop
+from lever_sil.batch.motions import FREQUENCIES, PERIOD, Motion
+from lever_sil.batch.sensors import Fault, Sensors
 from lever_sil.envelope import conditions
-from lever_sil.envelope.condition import ClosedLoop, Condition
+from lever_sil.envelope.condition import Condition
 from lever_sil.envelope.measure import FIGURES, Outcome
-from lever_sil.envelope.motions import FREQUENCIES, PERIOD, Motion
-from lever_sil.envelope.sensors import Fault, Sensors
 from lever_sil.study.baselines.joint_ekf import Joint
+from lever_sil.study.compare_envelope import filters, logs, run_estimators, tables
+from lever_sil.study.compare_envelope.run_estimators import ESTIMATORS, Result
 from lever_sil.study.data import Batch
-from lever_sil.study.peers import campaign, filters, logs, tables
-from lever_sil.study.peers.campaign import ESTIMATORS, Result
 from numpy.typing import NDArray
 from python.conftest import Refused
 
@@ -130,10 +131,10 @@ class Fixed(Joint):
 
 
 def test_progress_counts_conditions(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(campaign, "do", lambda task: (task, []))
+    monkeypatch.setattr(run_estimators, "do", lambda task: (task, []))
     shown: list[tuple[int, int, str]] = []
-    todo = [campaign.Task(("a", "b"), 1, ()), campaign.Task(("c",), 1, ())]
-    assert campaign.run(todo, 1, lambda *step: shown.append(step)) == []
+    todo = [run_estimators.Task(("a", "b"), 1, ()), run_estimators.Task(("c",), 1, ())]
+    assert run_estimators.run(todo, 1, lambda *step: shown.append(step)) == []
     assert shown == [(2, 3, "b"), (3, 3, "c")]
 
 

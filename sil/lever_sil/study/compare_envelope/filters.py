@@ -18,9 +18,9 @@ from lever_cdkf.models.lever import Lever
 from lever_cdkf.numeric.arrays import Array
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from ...envelope.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
-from ...envelope.motions import FREQUENCIES, PERIOD, STRIDE
-from ...envelope.sensors import NOISE
+from ...batch.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
+from ...batch.motions import FREQUENCIES, PERIOD, STRIDE
+from ...batch.sensors import NOISE
 from ..baselines.joint_ekf import Joint, JointEkf
 from ..baselines.joint_ukf import JointUkf
 from ..baselines.recursion import follow

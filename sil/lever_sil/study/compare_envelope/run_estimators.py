@@ -9,9 +9,9 @@ import numpy as np
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.runtime import interrupts
 
+from ...batch.firmware import Track
 from ...envelope import conditions
 from ...envelope.condition import Condition
-from ...envelope.firmware import Track
 from ...envelope.measure import FIGURES, Outcome
 from .filters import PEERS, tracks
 from .logs import Log, chunks, logs

@@ -10,12 +10,13 @@ import numpy as np
 from lever_cdkf.errors import SettingsError
 from lever_cdkf.firmware.config import Config
 
-from ..judged import result as judged
-from . import firmware, pilots, plant
-from .condition import ClosedLoop, Condition
+from ..acceptance import result as judged
+from ..batch import firmware, pilots, plant
+from ..batch.firmware import ClosedLoop
+from ..batch.motions import Motion, Recording, lanes, truth
+from ..batch.sensors import measured
+from .condition import Condition
 from .measure import FIGURES, Excerpt, Outcome, excerpt
-from .motions import Motion, Recording, lanes, truth
-from .sensors import measured
 
 LANE_SECONDS = 64 * 60.0
 """Of all runs that are simulated at a time, which bounds the memory."""

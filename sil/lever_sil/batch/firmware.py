@@ -17,7 +17,6 @@ from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from ..fast.library import Struct, lib
-from .condition import ClosedLoop
 from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, columns, lanes, truth
 from .plant import TICK, Plant
 from .sensors import NOISE, lost
@@ -28,6 +27,19 @@ MOTOR_LAG = 2e-3
 RESPONSE_STRIDE = 50
 """Rows of a track between two responses."""
 _KEEP_ALIVE = 250  # samples between two commands
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """The firmware makes the dither itself, and a share of its samples is lost."""
+
+    dither: float = 0.3
+    """rms [N m]"""
+    lost: float = 0.5
+    lost_for: float = PERIOD
+    """At a time [s]."""
+    whole: bool = False
+    """The whole sample, not LEVER_SAMPLE alone."""
 
 
 @dataclass(frozen=True)

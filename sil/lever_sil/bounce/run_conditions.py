@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..judged import result as judged
+from ..acceptance import result as judged
 from ..run.seeds import in_processes
 from .conditions import CONDITIONS, Condition
 from .measure import FIGURES, Excerpt, Measured

@@ -16,7 +16,7 @@ from lever_cdkf.runtime.files import check_writable, json_text, make_folder, wri
 from .names import check_names
 
 if TYPE_CHECKING:
-    from ..judged.result import Figure, Judged, Limit, Result
+    from ..acceptance.result import Figure, Judged, Limit, Result
 
 Row = TypeVar("Row", bound="Judged")
 Show = Callable[[int, int, str], None]
@@ -87,7 +87,7 @@ class JudgedCommand(ABC, Generic[Row]):
         from lever_cdkf.cli.progress import Progress
         from lever_cdkf.cli.tables import print_tables
 
-        from ..judged import table
+        from ..acceptance import table
 
         if args.list:
             listed = {
@@ -120,7 +120,7 @@ class JudgedCommand(ABC, Generic[Row]):
 
         from lever_cdkf.runtime.provenance import provenance, with_provenance
 
-        from ..judged import table
+        from ..acceptance import table
 
         origin = provenance()
         files = {args.out / f"{self.name}.html": with_provenance(self.page(results, seeds), origin)}

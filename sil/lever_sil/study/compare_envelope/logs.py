@@ -11,10 +11,11 @@ from lever_cdkf.errors import SettingsError
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.numeric.arrays import Array
 
-from ...envelope import firmware, pilots, plant
-from ...envelope.condition import ClosedLoop, Condition
-from ...envelope.motions import Motion, Recording, arms, lanes, truth
-from ...envelope.sensors import Sensors, lost, measured
+from ...batch import firmware, pilots, plant
+from ...batch.firmware import ClosedLoop
+from ...batch.motions import Motion, Recording, arms, lanes, truth
+from ...batch.sensors import Sensors, lost, measured
+from ...envelope.condition import Condition
 
 LANES = 64
 """Runs filtered at a time: more would save little time and cost memory."""
