@@ -19,7 +19,7 @@ from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import CHOICES
 from lever_cdkf.firmware.library import enum_names
 from lever_cdkf.firmware.native import Config
-from lever_sil.run.runner import Result, simulate
+from lever_sil.run.runner import SimulationResult, simulate
 from lever_sil.scenarios import scenario
 from lever_sil.scenarios.scenario import Scenario
 
@@ -237,7 +237,7 @@ SHORT = ["duration=6 s", "converged_after=2 s", "limits={}"]
 class Session:
     """A simulation and the log it left."""
 
-    result: Result
+    result: SimulationResult
     folder: Path
     config: Config
     """Of its estimator."""

@@ -37,7 +37,7 @@ def why_refused(corrupt: int, late: int) -> str:
     return ", ".join(reasons)
 
 
-class Traffic:
+class EstimatorFrames:
     """Picks the frames; the counts are of what has been read so far."""
 
     def __init__(
@@ -180,7 +180,7 @@ class Traffic:
         )
 
 
-def sample_chunks(traffic: Traffic) -> Iterator[dict[str, NDArray[np.float64]]]:
+def sample_chunks(traffic: EstimatorFrames) -> Iterator[dict[str, NDArray[np.float64]]]:
     """Yield the samples, as run_samples() takes them, a chunk at a time: time_us (continued beyond 32 bits), theta
     [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s^2], grip_force [N]; NaN where a value is invalid or its
     LEVER_SAMPLE or GRIP_SAMPLE is missing.
@@ -253,7 +253,7 @@ class _Pairing:
         return continued
 
 
-def read_samples(traffic: Traffic) -> dict[str, NDArray[np.float64]]:
+def read_samples(traffic: EstimatorFrames) -> dict[str, NDArray[np.float64]]:
     """Return all of sample_chunks() together."""
     chunks = list(sample_chunks(traffic))
     return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}

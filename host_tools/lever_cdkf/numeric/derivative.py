@@ -12,7 +12,7 @@ STEP = 0.02
 """[s] of a mean."""
 _LONGEST = 60.0  # [s] that are compared
 _ALIKE = 0.8  # correlation from which on a ratio says something
-_IN_DEGREES = {"theta_dot": (40.0, 80.0), "theta": (0.0125, 0.025)}  # of slope_ratio(), where the other is in rad
+_IN_DEGREES = {"theta_dot": (40.0, 80.0), "theta": (0.0125, 0.025)}  # of derivative_ratio(), where the other is in rad
 
 
 class Signal(Protocol):
@@ -26,14 +26,14 @@ class Signal(Protocol):
 
 def in_degrees(theta: Signal, theta_dot: Signal) -> tuple[str, str] | None:
     """Return which of the two looks like degrees where the other is in radians, and why."""
-    ratio = abs(slope_ratio(theta, theta_dot))
+    ratio = abs(derivative_ratio(theta, theta_dot))
     for name, (low, high) in _IN_DEGREES.items():
         if low < ratio < high:
             return name, f"theta_dot is {ratio:.3g} times the slope of theta: {name} looks like degrees"
     return None
 
 
-def together(one: Signal, other: Signal) -> tuple[FloatArray, FloatArray]:
+def interval_means(one: Signal, other: Signal) -> tuple[FloatArray, FloatArray]:
     """Their means over the same stretches of STEP, of at most a minute."""
     if not len(one.time) or not len(other.time):
         return np.zeros(0), np.zeros(0)
@@ -42,12 +42,12 @@ def together(one: Signal, other: Signal) -> tuple[FloatArray, FloatArray]:
     return _means(one, edges), _means(other, edges)
 
 
-def slope_likeness(angle: Signal, rate: Signal) -> float:
+def derivative_correlation(angle: Signal, rate: Signal) -> float:
     """Return correlation of the slope of an angle with a rate; 0 where there is too little of both."""
     return _likeness(*_slope_and_rate(angle, rate))
 
 
-def slope_ratio(angle: Signal, rate: Signal) -> float:
+def derivative_ratio(angle: Signal, rate: Signal) -> float:
     """Return a rate as a multiple of the slope of the angle, negative where their signs differ; 0 where they are not
     alike."""
     slope, value = _slope_and_rate(angle, rate)
@@ -61,7 +61,7 @@ def _likeness(slope: FloatArray, rate: FloatArray) -> float:
 
 def _slope_and_rate(angle: Signal, rate: Signal) -> tuple[FloatArray, FloatArray]:
     """Return both at the same times, as far as both are known; empty where that is too little."""
-    angles, rates = together(angle, rate)
+    angles, rates = interval_means(angle, rate)
     slope, value = (angles[2:] - angles[:-2]) / (2.0 * STEP), rates[1:-1]
     both = np.isfinite(slope) & np.isfinite(value)
     slope, value = slope[both], value[both]

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def unheard() -> Iterator[None]:
+def quiet_asammdf() -> Iterator[None]:
     """Open in it, and after a failure, when its exception is gone, gc.collect() in it, which deletes its objects."""
     logger = logging.getLogger("asammdf")
     before = sys.unraisablehook, logger.disabled

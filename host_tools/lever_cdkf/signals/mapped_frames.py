@@ -51,8 +51,8 @@ class Origin:
     size: int = 1
 
 
-class MappedTraffic:
-    """A can.estimator_frames.Traffic of logs that do not speak lever.dbc."""
+class MappedFrames:
+    """A can.estimator_frames.EstimatorFrames of logs that do not speak lever.dbc."""
 
     def __init__(self, logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> None:
         """Read all of it. Raise LeverError."""

@@ -15,7 +15,7 @@ from .recorded import Signal
 from .units import INPUTS, KINDS
 
 
-def own_mapping(columns: Iterable[Signal], where: str) -> Mapping:
+def mapping_by_name(columns: Iterable[Signal], where: str) -> Mapping:
     """Return the mapping of columns that are called as the inputs are. Raise LeverError."""
     sources = {}
     for key in INPUTS:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 
-def near_names(name: str, known: Iterable[str], most: int = 3) -> list[str]:
+def nearest_names(name: str, known: Iterable[str], most: int = 3) -> list[str]:
     """Return the known names that are like it, the nearest first, whatever their case."""
     from difflib import get_close_matches
 
@@ -15,5 +15,5 @@ def near_names(name: str, known: Iterable[str], most: int = 3) -> list[str]:
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:
     """Return a question after the nearest name, or what is said where none is near."""
-    near = near_names(name, known, 1)
+    near = nearest_names(name, known, 1)
     return f"did you mean {near[0]}?" if near else otherwise

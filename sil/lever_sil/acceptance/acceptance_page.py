@@ -10,7 +10,7 @@ from lever_cdkf.report.figure import Figure
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table
 
-from .result import Result
+from .result import ConditionResult
 from .table import MISSED, figures, lines, state
 
 _STYLE = """
@@ -22,7 +22,7 @@ _STYLE = """
 """
 
 
-def build(page: Page, results: Sequence[Result], charts: Sequence[Figure | None], note: str) -> str:
+def build(page: Page, results: Sequence[ConditionResult], charts: Sequence[Figure | None], note: str) -> str:
     """Return the whole page, with a chart for each result; `note` explains the figures."""
     page.section(
         "table", "Table", "Measured values against their limits", _table(lines(results)), _legend(results, note)
@@ -34,7 +34,7 @@ def build(page: Page, results: Sequence[Result], charts: Sequence[Figure | None]
     return page.html(_verdict(results), _STYLE)
 
 
-def _verdict(results: Sequence[Result]) -> str:
+def _verdict(results: Sequence[ConditionResult]) -> str:
     judged = [result for result in results if result.condition.limits]
     missed = [f'<a href="#{each.condition.name}">{each.condition.name}</a>' for each in judged if not each.ok]
     return (
@@ -57,7 +57,7 @@ def _cells(row: Row) -> list[str]:
     return list(cells.values())
 
 
-def _legend(results: Sequence[Result], note: str) -> str:
+def _legend(results: Sequence[ConditionResult], note: str) -> str:
     used = {name: result.known[name] for result in results for name in result.condition.figures}
     rows = ([html.escape(name), html.escape(each.unit), html.escape(each.meaning)] for name, each in used.items())
     return (

@@ -80,7 +80,7 @@ class Figure:
         return {"all": self.pool, "p90": self.p90, "worst": self.worst}[runs](values)
 
 
-class Judged(Protocol):
+class AcceptanceCondition(Protocol):
     """A row of the table."""
 
     @property
@@ -105,12 +105,12 @@ class Judged(Protocol):
 
 
 @dataclass(frozen=True)
-class Result:
+class ConditionResult:
     """A condition and what was measured."""
 
     known: ClassVar[Mapping[str, Figure]]
     """All figures by name."""
-    condition: Judged
+    condition: AcceptanceCondition
     values: Mapping[str, Values]
     """Figures, one value a run; empty when it could not be run."""
     problem: str = ""

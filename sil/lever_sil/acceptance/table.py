@@ -8,21 +8,21 @@ from typing import Any
 
 from lever_cdkf.cli.tables import Row
 
-from .result import Limit, Result
+from .result import ConditionResult, Limit
 
 HOLDS, MISSED, REPORTED = "holds", "MISSED", "reported"
 COLUMNS = {"all runs": "all", "median": "median", "p90": "p90", "worst": "worst"}
 """Of a figure: over which of the runs."""
 
 
-def state(result: Result) -> str:
+def state(result: ConditionResult) -> str:
     """Return whether its limits hold, in a word."""
     if result.ok:
         return HOLDS if result.condition.limits else REPORTED
     return MISSED
 
 
-def lines(results: Sequence[Result]) -> list[Row]:
+def lines(results: Sequence[ConditionResult]) -> list[Row]:
     """Return a line for each figure that has a limit, or for all where none has; the condition stands on its first."""
     rows: list[Row] = []
     for result in results:
@@ -33,12 +33,12 @@ def lines(results: Sequence[Result]) -> list[Row]:
     return rows
 
 
-def figures(result: Result) -> list[Row]:
+def figures(result: ConditionResult) -> list[Row]:
     """Return a line for each figure of a condition."""
     return [_line(result, name) for name in result.condition.figures] if result.values else [_problem(result)]
 
 
-def _line(result: Result, name: str) -> Row:
+def _line(result: ConditionResult, name: str) -> Row:
     figure, values = result.known[name], result.values[name]
     return {
         "figure": name,
@@ -48,7 +48,7 @@ def _line(result: Result, name: str) -> Row:
     }
 
 
-def _shown(result: Result, name: str, over: str, value: float) -> str:
+def _shown(result: ConditionResult, name: str, over: str, value: float) -> str:
     """With as many digits as it takes to show on which side of a limit it is."""
     both = (*result.condition.limits, *result.condition.unless)
     limits = [limit for limit in both if (limit.figure, limit.over) == (name, over)]
@@ -59,24 +59,24 @@ def _shown(result: Result, name: str, over: str, value: float) -> str:
     return f"≥ {next(shown)}" if value >= result.known[name].sought_to else next(shown)
 
 
-def _problem(result: Result) -> Row:
+def _problem(result: ConditionResult) -> Row:
     nothing = dict.fromkeys(("unit", *COLUMNS, "limit"), "")
     return {"figure": f"not run: {result.problem}", **nothing}
 
 
-def limit_text(result: Result, name: str) -> str:
+def limit_text(result: ConditionResult, name: str) -> str:
     """Return the limits of a figure; those that do instead of the others come after "or"."""
     own = ", ".join(str(limit) for limit in result.condition.limits if limit.figure == name)
     instead = ", ".join(f"or {limit}" for limit in result.condition.unless if limit.figure == name)
     return "; ".join(part for part in (own, instead) if part)
 
 
-def rows(results: Sequence[Result]) -> list[dict[str, Any]]:
+def rows(results: Sequence[ConditionResult]) -> list[dict[str, Any]]:
     """Return a row for each condition, as JSON has it: what is held against the limits, and all figures of all runs."""
     return [_row(result) for result in results]
 
 
-def _row(result: Result) -> dict[str, Any]:
+def _row(result: ConditionResult) -> dict[str, Any]:
     condition = result.condition
     limits = (*condition.limits, *condition.unless) or tuple(Limit(name) for name in result.values)
     return {
@@ -95,12 +95,12 @@ def _row(result: Result) -> dict[str, Any]:
     }
 
 
-def _key(result: Result, limit: Limit) -> str:
+def _key(result: ConditionResult, limit: Limit) -> str:
     over = "" if limit.over == "all" else f", {limit.over}"
     return f"{limit.figure}{over} [{result.known[limit.figure].unit}]"
 
 
-def _figure(result: Result, name: str) -> dict[str, Any]:
+def _figure(result: ConditionResult, name: str) -> dict[str, Any]:
     figure, values = result.known[name], result.values[name]
     return {
         "figure": name,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..fast.library import Struct, lib
 from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, columns, lanes, truth
-from .plant import TICK, Plant
+from .plant import TICK, BatchPlant
 from .sensors import NOISE, lost
 
 PARAMETERS = ("m_p", "c_p", "k_p")
@@ -122,7 +122,7 @@ def closed_loop(
     the last torque that it was asked for.
     """
     given = lanes(motion, seeds)
-    plant, (count, width) = Plant(given), given.z_ddot.shape
+    plant, (count, width) = BatchPlant(given), given.z_ddot.shape
     noise = [sigma * columns(f"noise of {what}", seeds, count) for what, sigma in NOISE.items()]
     gone = lost(seeds, count, loop.lost, loop.lost_for)
     tau_m, notes = np.zeros((count, width)), _Notes(count, width)

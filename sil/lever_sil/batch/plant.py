@@ -96,7 +96,7 @@ def natural_frequency_and_damping(
     return omega / (2.0 * np.pi), (rise**2 * c_p + hardware.damping) / (2.0 * omega * inertia)
 
 
-class Plant:
+class BatchPlant:
     """Levers in motion, by fast/c/lanes.h: `theta` [rad] and `theta_dot` [rad/s] of each lane at the samples so far, at
     the first at rest at the trim."""
 
@@ -157,7 +157,7 @@ def grip_force(lanes: Lanes, theta: FloatArray, theta_dot: FloatArray) -> FloatA
 
 def run(lanes: Lanes, tick: Callable[[], None] = lambda: None) -> tuple[FloatArray, FloatArray]:
     """theta [rad] and theta_dot [rad/s] of every lane at every sample; `tick` is called now and then."""
-    plant = Plant(lanes)
+    plant = BatchPlant(lanes)
     for first in range(0, plant.count - 1, TICK):
         plant.move(first, min(first + TICK, plant.count - 1))
         tick()

@@ -12,12 +12,12 @@ from lever_cdkf.report.page import Page
 from ..acceptance import acceptance_page
 from .flights import AIRCRAFT, FIVE
 from .measure import Excerpt
-from .run_conditions import Result
+from .run_conditions import BounceResult
 
 _MOST = 15.0  # [dB]
 
 
-def build(results: Sequence[Result], seeds: int) -> str:
+def build(results: Sequence[BounceResult], seeds: int) -> str:
     """Return the whole page."""
     page = Page(
         "Collective bounce: seen coming, and how far it is held off",

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..acceptance import result as judged
+from ..acceptance.result import ConditionResult
 from ..run.seeds import in_processes
 from .conditions import CONDITIONS, Condition
 from .measure import FIGURES, Excerpt, Measured
@@ -20,7 +20,7 @@ Show = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
-class Result(judged.Result):
+class BounceResult(ConditionResult):
     """A condition and what was measured."""
 
     known = FIGURES
@@ -45,7 +45,7 @@ def measure(task: Task) -> Measured:
     return CONDITIONS[task.condition].measure(task.craft, task.seed)
 
 
-def run(rows: Sequence[Condition], seeds: int, show: Show) -> list[Result]:
+def run(rows: Sequence[Condition], seeds: int, show: Show) -> list[BounceResult]:
     """Return the results of the rows, in their order, with so many pilots. Rows that measure the same share the
     flights."""
     flown = {row.measure: row for row in reversed(rows)}
@@ -62,9 +62,9 @@ def _flights(row: Condition, seeds: int) -> list[tuple[str, int]]:
     return [(craft, seed) for craft in row.aircraft for seed in range(seeds)]
 
 
-def _result(row: Condition, flights: Sequence[tuple[str, int]], found: Sequence[Measured]) -> Result:
+def _result(row: Condition, flights: Sequence[tuple[str, int]], found: Sequence[Measured]) -> BounceResult:
     values = {name: np.array([each.figures[name] for each in found]) for name in row.figures}
     names = [f"{craft}, pilot {seed}" for craft, seed in flights]
-    result = Result(row, values, runs=names)
+    result = BounceResult(row, values, runs=names)
     worst = names.index(str(result.worst_run(row.figures[0])))
     return replace(result, excerpt=found[worst].excerpt)

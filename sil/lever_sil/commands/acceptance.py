@@ -16,14 +16,14 @@ from lever_cdkf.runtime.files import check_writable, json_text, make_folder, wri
 from .names import check_names
 
 if TYPE_CHECKING:
-    from ..acceptance.result import Figure, Judged, Limit, Result
+    from ..acceptance.result import AcceptanceCondition, ConditionResult, Figure, Limit
 
-Row = TypeVar("Row", bound="Judged")
+Row = TypeVar("Row", bound="AcceptanceCondition")
 Show = Callable[[int, int, str], None]
 """Progress: done, total, what."""
 
 
-class JudgedCommand(ABC, Generic[Row]):
+class AcceptanceCommand(ABC, Generic[Row]):
     """A sub-command of `lever`; what it needs is imported when it is."""
 
     name: str
@@ -49,11 +49,11 @@ class JudgedCommand(ABC, Generic[Row]):
         """Return all that are measured, by name."""
 
     @abstractmethod
-    def measure(self, chosen: Sequence[Row], seeds: int, show: Show) -> Sequence[Result]:
+    def measure(self, chosen: Sequence[Row], seeds: int, show: Show) -> Sequence[ConditionResult]:
         """Their results, in order."""
 
     @abstractmethod
-    def page(self, results: Sequence[Result], seeds: int) -> str:
+    def page(self, results: Sequence[ConditionResult], seeds: int) -> str:
         """As HTML."""
 
     def add_parser(self, subparsers: argparse._SubParsersAction[Any]) -> None:
@@ -114,7 +114,7 @@ class JudgedCommand(ABC, Generic[Row]):
         self._write(args, results, seeds)
         return 1 if missed else 0
 
-    def _write(self, args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
+    def _write(self, args: argparse.Namespace, results: Sequence[ConditionResult], seeds: int) -> None:
         """Write the files that were asked for."""
         from dataclasses import asdict
 
@@ -141,7 +141,7 @@ class JudgedCommand(ABC, Generic[Row]):
         return [known[name] for name in dict.fromkeys(names)]
 
 
-def _listed(condition: Judged, known: Mapping[str, Figure]) -> dict[str, str | bool]:
+def _listed(condition: AcceptanceCondition, known: Mapping[str, Figure]) -> dict[str, str | bool]:
     def spelled(each: Sequence[Limit]) -> str:
         return ", ".join(f"{limit.figure} {limit} {known[limit.figure].unit}".removesuffix(" 1") for limit in each)
 

@@ -11,7 +11,7 @@ from lever_cdkf.errors import LeverError
 
 from ..envelope import conditions
 from ..study.compare_envelope import run_estimators, tables
-from ..study.compare_envelope.filters import PEERS
+from ..study.compare_envelope.filters import JOINT_FILTERS
 from .names import check_names
 
 SEEDS = 8
@@ -19,7 +19,7 @@ _NOT_HERE = ("models", "duration", "seed", "out", "score", "data")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return the firmware and its peers in the conditions of `lever envelope`."""
+    """Return the firmware and joint EKF and UKF in the conditions of `lever envelope`."""
     if args.list:
         print_tables(_listed(), args.json)
         return 0
@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _listed() -> dict[str, list[Row]]:
     titles = {run_estimators.FIRMWARE: "as shipped, with the settings of the condition"}
-    titles |= {name: peer.title for name, peer in PEERS.items()}
+    titles |= {name: each.title for name, each in JOINT_FILTERS.items()}
     return {
         "conditions": [{"name": name, "title": one.title} for name, one in conditions.CONDITIONS.items()],
         "estimators": [{"name": name, "title": title} for name, title in titles.items()],

@@ -16,7 +16,7 @@ from lever_cdkf.runtime.files import json_text, make_folder, write_texts
 from .names import check_names
 
 if TYPE_CHECKING:
-    from ..faults.matrix import Result
+    from ..faults.matrix import RowResult
     from ..faults.rows import Row
 
 _DESCRIPTION = """\
@@ -75,7 +75,9 @@ def run(args: argparse.Namespace) -> int:
     from ..faults.rows import ROWS
 
     if args.list:
-        listed = [{"fault": row.name, "title": row.title, "must": table.demands(row.must)} for row in ROWS.values()]
+        listed = [
+            {"fault": row.name, "title": row.title, "must": table.demands(row.requirement)} for row in ROWS.values()
+        ]
         print_tables({"faults": listed}, args.json)
         return 0
     require("report")
@@ -95,7 +97,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if unexpected else 0
 
 
-def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
+def _write(args: argparse.Namespace, results: Sequence[RowResult], seeds: int) -> None:
     """Write the files that were asked for."""
     from dataclasses import asdict
 

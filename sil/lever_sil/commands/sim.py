@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import can
     from lever_cdkf.report.page import Story
 
-    from ..run.runner import Result
+    from ..run.runner import SimulationResult
     from ..scenarios.scenario import Scenario
 
 _DESCRIPTION = """\
@@ -285,7 +285,7 @@ def open_bus(
     return buses.open_bus(interface, channel, bus_options or {})
 
 
-def _tables(result: Result) -> Tables:
+def _tables(result: SimulationResult) -> Tables:
     """Return what is printed at the end."""
     from lever_cdkf.firmware.quantities import quantities
 
@@ -330,7 +330,7 @@ def _times(times: Sequence[float | None]) -> str:
     return ", ".join("-" if seconds is None else f"{seconds:.1f}" for seconds in times)
 
 
-def _reason(result: Result) -> str:
+def _reason(result: SimulationResult) -> str:
     """Return why a run did not pass, in a line."""
     summary = result.summary
     reasons = [f"{summary.unanswered} samples without an answer"] if summary.unanswered else []

@@ -15,7 +15,7 @@ from lever_cdkf.runtime.extras import require
 from lever_cdkf.runtime.files import check_writable, json_text, write_texts
 
 if TYPE_CHECKING:
-    from ..soak.soak import Result
+    from ..soak.soak import SoakResult
 
 _DESCRIPTION = """\
 Flies one instance of the firmware for hours, without a reset: flights of five minutes one after another, each with a
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if troubles else 0
 
 
-def _verdict(result: Result) -> str:
+def _verdict(result: SoakResult) -> str:
     total, faults = result.total, sum(result.faults.values())
     return (
         f"{total.seconds / 3600.0:.2f} h flown with {faults} faults: NEES {total.row()['NEES [1]']:.2f} (expected 1), "

@@ -11,10 +11,10 @@ from lever_cdkf.report.page import Page
 
 from ..acceptance import acceptance_page
 from .measure import Excerpt
-from .run_conditions import Result
+from .run_conditions import EnvelopeResult
 
 
-def build(results: Sequence[Result], seeds: int) -> str:
+def build(results: Sequence[EnvelopeResult], seeds: int) -> str:
     """Return the whole page."""
     page = Page(
         "The conditions that a collective meets",
@@ -27,7 +27,7 @@ def build(results: Sequence[Result], seeds: int) -> str:
     return acceptance_page.build(page, results, charts, f"Flagged is any of {', '.join(fault_names(DO_NOT_TRUST))}.")
 
 
-def _chart(shown: Excerpt, result: Result) -> Figure:
+def _chart(shown: Excerpt, result: EnvelopeResult) -> Figure:
     """Return natural frequency over time; dots at the foot where the firmware says: do not trust this."""
     low, high = shown.value - 2.0 * shown.sigma, shown.value + 2.0 * shown.sigma
     values = np.concatenate((shown.truth[shown.truth > 2.0], shown.value))

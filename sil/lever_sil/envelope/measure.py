@@ -15,7 +15,7 @@ from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from lever_cdkf.report.series import runs
 from numpy.typing import NDArray
 
-from ..acceptance import result as judged
+from ..acceptance import result as acceptance
 from ..acceptance.result import Values, largest, mean
 from ..batch.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from ..batch.motions import Recording
@@ -248,7 +248,7 @@ def _pooled_rms(values: Values) -> float:
 
 
 @dataclass(frozen=True)
-class Figure(judged.Figure):
+class Figure(acceptance.Figure):
     """One way to measure an outcome."""
 
     compute: Callable[[Outcome], Values] = field(kw_only=True)

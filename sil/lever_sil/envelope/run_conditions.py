@@ -10,7 +10,7 @@ import numpy as np
 from lever_cdkf.errors import SettingsError
 from lever_cdkf.firmware.config import Config
 
-from ..acceptance import result as judged
+from ..acceptance.result import ConditionResult
 from ..batch import firmware, pilots, plant
 from ..batch.firmware import ClosedLoop
 from ..batch.motions import Motion, Recording, lanes, truth
@@ -43,7 +43,7 @@ class Job(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Result(judged.Result):
+class EnvelopeResult(ConditionResult):
     """A condition and what was measured."""
 
     known = FIGURES
@@ -51,13 +51,13 @@ class Result(judged.Result):
     excerpt: Excerpt | None = None
 
 
-def run(rows: Sequence[Condition], everything: Mapping[str, Condition], seeds: int, show: Show) -> list[Result]:
+def run(rows: Sequence[Condition], everything: Mapping[str, Condition], seeds: int, show: Show) -> list[EnvelopeResult]:
     """Return the results of the rows, in their order; `seeds` runs of each, or some times as many where runs draw."""
     references = [everything[row.against] for row in rows if row.against is not None]
     groups: dict[Group, list[Condition]] = {}
     for row in {row.name: row for row in (*references, *rows)}.values():  # a reference has the motion of its row
         groups.setdefault(Group(row.motion, row.runs, row.closed_loop), []).append(row)
-    parts: dict[str, list[Result]] = {row.name: [] for own in groups.values() for row in own}
+    parts: dict[str, list[EnvelopeResult]] = {row.name: [] for own in groups.values() for row in own}
     jobs = [Job(group, each) for group in groups for each in _portions(seeds * group.runs, group.motion.duration)]
     total = sum(len(groups[job.group]) for job in jobs)
 
@@ -82,7 +82,7 @@ def _most_lanes(duration: float) -> int:
     return max(1, int(LANE_SECONDS / duration))
 
 
-def _joined(parts: Sequence[Result]) -> Result:
+def _joined(parts: Sequence[EnvelopeResult]) -> EnvelopeResult:
     """Return one result of some for different seeds; the excerpt is of the first."""
     first = parts[0]
     values = {name: np.concatenate([part.values[name] for part in parts]) for name in first.values}
@@ -91,12 +91,12 @@ def _joined(parts: Sequence[Result]) -> Result:
 
 def _result(
     row: Condition, seeds: range, recording: Recording | None, outcomes: dict[str, Outcome], tick: Tick
-) -> Result:
+) -> EnvelopeResult:
     """Run a condition; its outcome becomes one of `outcomes`, which later ones may be measured against."""
     try:
         config = Config(model=row.model, settings=row.settings)
     except SettingsError as error:
-        return Result(row, {}, problem=str(error).partition(";")[0])
+        return EnvelopeResult(row, {}, problem=str(error).partition(";")[0])
     if recording is None:
         loop = row.closed_loop or ClosedLoop()
         recording, track = firmware.closed_loop(config, row.motion, seeds, loop, tick)
@@ -106,7 +106,7 @@ def _result(
     outcomes[row.name] = outcome
     with np.errstate(all="ignore"):  # an estimate that is not finite is no warning but a figure that keeps no limit
         values = {name: FIGURES[name].compute(outcome) for name in row.figures}
-        return Result(row, values, runs=[f"seed {seed}" for seed in seeds], excerpt=excerpt(outcome))
+        return EnvelopeResult(row, values, runs=[f"seed {seed}" for seed in seeds], excerpt=excerpt(outcome))
 
 
 def _recordings(jobs: Iterable[Job], tick: Tick) -> Iterator[tuple[Job, Recording | None]]:

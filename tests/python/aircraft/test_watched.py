@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 from lever_cdkf.can import codec
-from lever_cdkf.can.estimator_frames import Traffic, read_samples
+from lever_cdkf.can.estimator_frames import EstimatorFrames, read_samples
 from lever_cdkf.can.logs import Recording
 from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.aircraft import AircraftResponse, read_response
@@ -43,7 +43,7 @@ def test_the_margin_is_that_of_the_estimator_with_the_same_samples(session: Sess
     """But for its steps on the bus."""
     estimator = Estimator(Config())
     estimator.watch(response("uh60_like", ["gearing=0.5", "warning=30"]))
-    samples = read_samples(Traffic(Recording([session.log])))
+    samples = read_samples(EstimatorFrames(Recording([session.log])))
     for row in zip(*(samples[name] for name in ("time_us", "theta", "theta_dot", "tau_m", "z_ddot")), strict=True):
         time_us, *values = (float(value) for value in row)
         estimator.update(int(time_us), *(None if np.isnan(value) else value for value in values))

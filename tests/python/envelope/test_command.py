@@ -126,7 +126,7 @@ def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 def test_a_figure_shows_on_which_side_of_its_limit_it_is() -> None:
     limits = (Limit("f_n largest", most=1.0), Limit("f_n largest", most=2.0, over="worst"))
     condition = Condition("steady", "", limits=limits)
-    result = run_conditions.Result(condition, dict.fromkeys(condition.figures, np.array([0.5, 1.0004])))
+    result = run_conditions.EnvelopeResult(condition, dict.fromkeys(condition.figures, np.array([0.5, 1.0004])))
     (line,) = table.lines([result])
     assert (line["all runs"], line["median"], line["p90"], line["worst"]) == ("1.0004", "0.75", "1", "1")
 
@@ -143,7 +143,7 @@ def test_a_figure_shows_on_which_side_of_its_limit_it_is() -> None:
     ],
 )
 def test_nine_runs_of_ten_are_no_worse_than_p90(figure: str, values: Sequence[float], expected: float) -> None:
-    result = run_conditions.Result(Condition("", ""), {figure: np.array(values, np.float64)})
+    result = run_conditions.EnvelopeResult(Condition("", ""), {figure: np.array(values, np.float64)})
     np.testing.assert_equal(result.of(Limit(figure, over="p90")), expected)
 
 

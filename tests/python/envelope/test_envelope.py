@@ -64,7 +64,7 @@ def test_friction_takes_its_share_of_each_half_swing() -> None:
     hardware = plant.Hardware(damping=0.0)
     given = motions.lanes(replace(QUIET, duration=2.0, base=0.0, dither=0.0, friction=0.05), range(1))
     given = replace(given, c_p=np.zeros((1, 1)), trim=np.full((1, 1), 0.3), hardware=hardware)
-    lanes = plant.Plant(given)
+    lanes = plant.BatchPlant(given)
     lanes.theta[0] += 0.01
     lanes.move(0, 1500)
     angle = lanes.theta[1:1501, 0] - 0.3

@@ -76,7 +76,7 @@ def test_what_is_wrong_shows() -> None:
     assert wrong.row()["k_p within 2 sigma [%]"] == 0.0
     assert wrong.silent_s == pytest.approx(wrong.unflagged * 0.02)
     part = soak.Part(soak.Sums(not_finite=3, in_fault=50), 130.0)
-    troubles = soak.Result([part], 100.0, Counter()).troubles()
+    troubles = soak.SoakResult([part], 100.0, Counter()).troubles()
     assert troubles == [
         "3 estimates were not finite",
         "the estimator was in fault for 1 s",

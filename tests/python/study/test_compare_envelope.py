@@ -18,7 +18,7 @@ from lever_sil.envelope.condition import Condition
 from lever_sil.envelope.measure import FIGURES, Outcome
 from lever_sil.study.baselines.joint_ekf import Joint
 from lever_sil.study.compare_envelope import filters, logs, run_estimators, tables
-from lever_sil.study.compare_envelope.run_estimators import ESTIMATORS, Result
+from lever_sil.study.compare_envelope.run_estimators import ESTIMATORS, EstimatorResult
 from lever_sil.study.data import Batch
 from numpy.typing import NDArray
 from python.conftest import Refused
@@ -74,19 +74,19 @@ def test_logs_say_what_the_sensors_said() -> None:
     np.testing.assert_array_equal(np.isnan(log.signals["z_ddot"]), gone)
 
 
-# --- the peers -------------------------------------------------------------------------------------------------------
+# --- the joint filters ----------------------------------------------------------------------------------------------
 
 
 def measured(log: logs.Log, name: str) -> tuple[float, float]:
     """Return median rms error of the natural frequency [%], and coverage [%]."""
-    (track,) = filters.tracks([log], filters.PEERS[name])
+    (track,) = filters.tracks([log], filters.JOINT_FILTERS[name])
     outcome = Outcome(log.recording, track, log.condition.window)
     return tuple(float(np.median(FIGURES[f"f_n {what}"].compute(outcome))) for what in ("rms", "covered"))  # type: ignore[return-value]
 
 
 def test_movement_needs_the_high_pass() -> None:
     (log,) = logs.logs([MOVED], 2)
-    for name in filters.PEERS:
+    for name in filters.JOINT_FILTERS:
         rms, covered = measured(log, name)
         assert (rms < 5.0) == (covered > 60.0) == name.endswith("_hp"), (name, rms, covered)
 
@@ -94,7 +94,7 @@ def test_movement_needs_the_high_pass() -> None:
 def test_steady_flight_does_not_and_missing_samples_are_skipped() -> None:
     faults = (Fault("theta", "invalid", 1.0, 1.5), Fault("z_ddot", "invalid", 2.0, 2.2))
     (log,) = logs.logs([Condition("steady", "", SHORT, sensors=Sensors(faults=faults), start=4.0)], 2)
-    for name in filters.PEERS:
+    for name in filters.JOINT_FILTERS:
         rms, covered = measured(log, name)
         assert rms < 4.0, name
         assert covered > 60.0, name
@@ -104,7 +104,7 @@ def test_feedthrough_is_as_uncertain_as_a_cloud_of_parameters() -> None:
     """The lever's transfer function written out, at a trim of 20 degrees."""
     (log,) = logs.logs([Condition("still", "", Motion(duration=0.2))], 1)
     log = dataclasses.replace(log, trim=np.radians([20.0]))
-    peer = filters.Peer("", Fixed, False)
+    peer = filters.JointFilter("", Fixed, False)
     found = filters.tracks([log], peer)[0].feedthrough
     assert found is not None
     m_p, c_p, k_p = np.array([2.5, 42.0, 1500.0])[:, None, None] * np.exp(
@@ -141,12 +141,12 @@ def test_progress_counts_conditions(monkeypatch: pytest.MonkeyPatch) -> None:
 # --- how it is said --------------------------------------------------------------------------------------------------
 
 
-def results(case: str, runs: int, **rms: float) -> list[Result]:
+def results(case: str, runs: int, **rms: float) -> list[EstimatorResult]:
     """Return errors about these, alike in all runs but for 10 %."""
     size = 1.0 + 0.1 * np.random.default_rng(1).standard_normal(runs)
     scatter = 1.0 + 0.01 * np.random.default_rng(2).standard_normal((len(rms), runs))
     return [
-        Result(case, name, value * size * own, np.full(runs, 95.0))
+        EstimatorResult(case, name, value * size * own, np.full(runs, 95.0))
         for (name, value), own in zip(rms.items(), scatter, strict=True)
     ]
 
@@ -164,7 +164,7 @@ def test_verdicts_are_of_significant_differences() -> None:
 
 
 def test_a_table_has_median_and_worst() -> None:
-    one = Result("a", "firmware", np.array([1.0, 2.0, np.inf]), np.array([90.0, 95.0, 0.0]))
+    one = EstimatorResult("a", "firmware", np.array([1.0, 2.0, np.inf]), np.array([90.0, 95.0, 0.0]))
     errors, coverage = tables.tables([one], 3).values()
     assert errors == [{"condition": "a", "firmware": "2 / ∞"}]
     assert coverage == [{"condition": "a", "firmware": "90 / 0"}]

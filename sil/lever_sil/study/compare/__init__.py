@@ -1,6 +1,6 @@
 """`lever compare`: every estimator on the same data, judged alike.
 
-cases.py       what is run: matched walks, steps, wrong noise, recorded scenarios, in one registry;  dataset.py: as files
+cases.py       what is run: matched walks, steps, wrong noise, recorded scenarios, in a registry;  dataset.py: as files
 entrants.py    who runs: the firmware in several configurations, and the baselines
 run_cases.py   runs them, in processes, and brings back errors
 evaluation.py  makes one row of figures of each;  comparison.py: who has smaller errors than whom

@@ -1,4 +1,4 @@
-"""The peers on many logs at once: joint EKF and UKF told the true noise and trim, with and without a high-pass.
+"""The joint filters on many logs at once: joint EKF and UKF told the true noise and trim, with and without a high-pass.
 
 All get what the firmware gets by default (first guess, its uncertainty, random walk, the lever) and are told besides
 the process noise of the condition and the trim: the angle about which the pilot moves the lever. What the pilot does
@@ -33,7 +33,7 @@ _SIGNALS = ("theta", "theta_dot", "z_ddot", "tau_m")
 _STEP = 1e-4  # of w, for derivatives
 
 
-class Peer(NamedTuple):
+class JointFilter(NamedTuple):
     """A filter, and whether a high-pass is in front of it."""
 
     title: str
@@ -41,20 +41,20 @@ class Peer(NamedTuple):
     high_pass: bool
 
 
-PEERS = {
-    "joint_ekf": Peer("joint extended Kalman filter", JointEkf, False),
-    "joint_ukf": Peer("joint unscented Kalman filter", JointUkf, False),
-    "joint_ekf_hp": Peer("joint extended Kalman filter behind a fourth-order high-pass", JointEkf, True),
-    "joint_ukf_hp": Peer("joint unscented Kalman filter behind a fourth-order high-pass", JointUkf, True),
+JOINT_FILTERS = {
+    "joint_ekf": JointFilter("joint extended Kalman filter", JointEkf, False),
+    "joint_ukf": JointFilter("joint unscented Kalman filter", JointUkf, False),
+    "joint_ekf_hp": JointFilter("joint extended Kalman filter behind a fourth-order high-pass", JointEkf, True),
+    "joint_ukf_hp": JointFilter("joint unscented Kalman filter behind a fourth-order high-pass", JointUkf, True),
 }
 
 
-def tracks(logs: Sequence[Log], peer: Peer) -> list[Track]:
-    """Return what a peer says of each log, all of one chunk, at every STRIDE-th sample; NaN from where it breaks
-    down."""
-    batch = _batch(logs, peer.high_pass)
+def tracks(logs: Sequence[Log], joint_filter: JointFilter) -> list[Track]:
+    """Return what a joint filter says of each log, all of one chunk, at every STRIDE-th sample; NaN from where it
+    breaks down."""
+    batch = _batch(logs, joint_filter.high_pass)
     at = np.arange(0, batch.samples, STRIDE, dtype=np.int64)
-    whole = _track(batch, follow(peer.filter(batch), at))
+    whole = _track(batch, follow(joint_filter.filter(batch), at))
     ends = np.cumsum([len(log.trim) for log in logs]).tolist()
     return [_part(whole, slice(end - len(log.trim), end)) for log, end in zip(logs, ends, strict=True)]
 
@@ -113,7 +113,7 @@ def _filtered(sections: Array, signals: Array, start: Array) -> Array:
 
 
 def _track(batch: Batch, estimates: Estimates) -> Track:
-    """In the firmware's terms; peers have neither faults nor modes."""
+    """In the firmware's terms; joint filters have neither faults nor modes."""
     assert estimates.covariance is not None
     parameters = batch.knowledge.physical(estimates.w)
     with np.errstate(all="ignore"):  # of runs that broke down

@@ -1,4 +1,4 @@
-"""The peers' results as tables, and whether the firmware's errors are larger or smaller than a peer's."""
+"""The joint filters' results as tables, and whether the firmware's errors are larger or smaller than a peer's."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from lever_cdkf.cli.tables import Row
 
 from ..compare.comparison import LEAST_RUNS, Differences, corrected, of_errors
-from .filters import PEERS
-from .run_estimators import ESTIMATORS, FIRMWARE, Result
+from .filters import JOINT_FILTERS
+from .run_estimators import ESTIMATORS, FIRMWARE, EstimatorResult
 
 
-def tables(results: Sequence[Result], seeds: int) -> dict[str, list[Row]]:
+def tables(results: Sequence[EstimatorResult], seeds: int) -> dict[str, list[Row]]:
     """Return median and worst run of each estimator in each condition: errors, and coverage."""
     of = f"median / worst of {seeds} pilots or more"
     return {
@@ -23,7 +23,7 @@ def tables(results: Sequence[Result], seeds: int) -> dict[str, list[Row]]:
     }
 
 
-def _table(results: Sequence[Result], what: str) -> list[Row]:
+def _table(results: Sequence[EstimatorResult], what: str) -> list[Row]:
     lines: list[Row] = []
     for condition, group in groupby(results, key=lambda result: result.condition):
         cells = {name: "" for name in ESTIMATORS if any(result.estimator == name for result in results)}
@@ -32,7 +32,7 @@ def _table(results: Sequence[Result], what: str) -> list[Row]:
     return lines
 
 
-def _two(result: Result, what: str) -> tuple[float, float]:
+def _two(result: EstimatorResult, what: str) -> tuple[float, float]:
     """Return median and worst."""
     values = result.rms if what == "rms" else result.covered
     return float(np.median(values)), float(values.max() if what == "rms" else values.min())
@@ -42,7 +42,7 @@ def _text(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "∞"
 
 
-def rows(results: Sequence[Result]) -> list[Row]:
+def rows(results: Sequence[EstimatorResult]) -> list[Row]:
     """Return a row for each estimator in each condition, with numbers."""
     table: list[Row] = []
     for result in results:
@@ -61,9 +61,9 @@ def rows(results: Sequence[Result]) -> list[Row]:
     return table
 
 
-def differences(results: Sequence[Result]) -> Differences:
-    """Return the differences of the peers' errors against the firmware's in each condition; without those that broke
-    down in a run."""
+def differences(results: Sequence[EstimatorResult]) -> Differences:
+    """Return the differences of the joint filters' errors against the firmware's in each condition; without those that
+    broke down in a run."""
     compared: Differences = {}
     for condition, group in groupby(results, key=lambda result: result.condition):
         squares = {one.estimator: np.square(one.rms)[:, np.newaxis] for one in group if np.isfinite(one.rms).all()}
@@ -72,14 +72,14 @@ def differences(results: Sequence[Result]) -> Differences:
     return corrected(compared)[0]
 
 
-def verdicts(results: Sequence[Result]) -> Iterator[str]:
-    """Yield a sentence on the firmware against each peer."""
+def verdicts(results: Sequence[EstimatorResult]) -> Iterator[str]:
+    """Yield a sentence on the firmware against each joint filter."""
     if any(len(result.rms) < LEAST_RUNS for result in results):
         yield f"Too few runs for a verdict: at least {LEAST_RUNS} are needed."
         return
     compared = differences(results)
-    for peer in PEERS:
-        pairs = {condition: one for (condition, name), one in compared.items() if name == peer}
+    for joint_filter in JOINT_FILTERS:
+        pairs = {condition: one for (condition, name), one in compared.items() if name == joint_filter}
         if not pairs:
             continue
         larger = [condition for condition, one in pairs.items() if one.significant and one.more < 0.0]
@@ -87,6 +87,6 @@ def verdicts(results: Sequence[Result]) -> Iterator[str]:
         names = f" ({', '.join(larger)})" if larger else ""
         alike = len(pairs) - len(larger) - len(smaller)
         yield (
-            f"The firmware's errors against {peer}: smaller in {len(smaller)} conditions, larger in "
+            f"The firmware's errors against {joint_filter}: smaller in {len(smaller)} conditions, larger in "
             f"{len(larger)}{names}, no significant difference in {alike}."
         )
