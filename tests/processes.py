@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 
 LEVER = str(Path(sys.executable).with_name("lever"))
 PATIENCE = 120.0
@@ -20,7 +20,7 @@ def lever(*arguments: str | Path) -> str:
     """Return what the command prints when it is run in this process, where Python need not start first; it must do."""
     output, errors = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
-        status = cli.main([str(argument) for argument in arguments])
+        status = main([str(argument) for argument in arguments])
     assert status == 0, errors.getvalue()
     return output.getvalue()
 

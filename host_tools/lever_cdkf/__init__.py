@@ -47,7 +47,7 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from .provenance import version
+        from .runtime.provenance import version
 
         return version()
     if name not in _HOMES:

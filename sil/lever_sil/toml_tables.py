@@ -15,9 +15,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
-from lever_cdkf import toml_text, units
 from lever_cdkf.errors import LeverError
-from lever_cdkf.near_names import did_you_mean
+from lever_cdkf.text import toml_text, units
+from lever_cdkf.text.suggestions import did_you_mean
 
 SIGNAL = "signal"
 """Unit of a field that is the unit of whatever the table describes: m/s^2 under [[base]], kg under pilot.m_p."""

@@ -12,9 +12,9 @@ sys.path[0] = str(ROOT / "tests")
 
 from accuracy import tables, tuning  # noqa: E402
 from accuracy.tables import Place  # noqa: E402
+from lever_cdkf.cli.progress import Progress  # noqa: E402
 from lever_cdkf.errors import LeverError  # noqa: E402
-from lever_cdkf.files import write_text  # noqa: E402
-from lever_cdkf.progress import Progress  # noqa: E402
+from lever_cdkf.runtime.files import write_text  # noqa: E402
 from lever_sil.run import seeds  # noqa: E402
 
 _DESCRIPTION = f"""\

@@ -22,13 +22,13 @@ if __name__ == "__main__":
 
 from accuracy import tables  # noqa: E402
 from accuracy.tables import Place  # noqa: E402
+from lever_cdkf.cli.progress import Progress  # noqa: E402
 from lever_cdkf.errors import LeverError  # noqa: E402
-from lever_cdkf.files import write_text  # noqa: E402
-from lever_cdkf.progress import Progress  # noqa: E402
-from lever_sil.bounce import campaign  # noqa: E402
+from lever_cdkf.runtime.files import write_text  # noqa: E402
+from lever_sil.acceptance import table  # noqa: E402
+from lever_sil.bounce import run_conditions  # noqa: E402
 from lever_sil.bounce.conditions import BETWEEN, CONDITIONS, FALSE, SPOILT, STATED  # noqa: E402
 from lever_sil.bounce.measure import FIGURES  # noqa: E402
-from lever_sil.judged import table  # noqa: E402
 
 Rows = Mapping[str, Mapping[str, Any]]
 """Those of `lever bounce --json` by the name of their condition."""
@@ -170,7 +170,7 @@ def _flown() -> Iterable[Mapping[str, Any]]:
     conditions = {row.condition for rows in TABLES.values() for row in rows}
     chosen = [condition for name, condition in CONDITIONS.items() if name in conditions]
     with Progress("bounce") as progress:
-        return table.rows(campaign.run(chosen, SEEDS, progress.show))
+        return table.rows(run_conditions.run(chosen, SEEDS, progress.show))
 
 
 def _read(path: Path) -> Iterable[Mapping[str, Any]]:

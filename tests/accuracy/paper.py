@@ -21,13 +21,13 @@ if __name__ == "__main__":
 
 from accuracy import tables  # noqa: E402
 from accuracy.tables import Place  # noqa: E402
+from lever_cdkf.cli.progress import Progress  # noqa: E402
+from lever_cdkf.cli.tables import Row  # noqa: E402
 from lever_cdkf.errors import LeverError  # noqa: E402
-from lever_cdkf.files import write_text  # noqa: E402
-from lever_cdkf.progress import Progress  # noqa: E402
-from lever_cdkf.tables import Row  # noqa: E402
+from lever_cdkf.runtime.files import write_text  # noqa: E402
 from lever_sil.run import seeds  # noqa: E402
 from lever_sil.study import no_accelerometer  # noqa: E402
-from lever_sil.study.compare import campaign, paper, protocols  # noqa: E402
+from lever_sil.study.compare import paper, protocols, run_cases  # noqa: E402
 from lever_sil.study.compare.cases import Plan  # noqa: E402
 
 SEEDS = paper.SEEDS
@@ -36,10 +36,10 @@ ACCEPT = "paper-accept"
 MODELS = ("linear_physical", "linear_black_box", "lever")
 
 
-def _ran(names: Sequence[str], count: int = SEEDS) -> campaign.Results:
-    todo = campaign.tasks(names, None, Plan(count))
+def _ran(names: Sequence[str], count: int = SEEDS) -> run_cases.Results:
+    todo = run_cases.tasks(names, None, Plan(count))
     with Progress("paper") as progress:
-        return campaign.run(todo, os.cpu_count() or 1, progress.show)
+        return run_cases.run(todo, os.cpu_count() or 1, progress.show)
 
 
 @cache

@@ -11,9 +11,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.quantities import DYNAMICS
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_cdkf.results.summary import SimulationSummary
 from lever_sil.run import seeds
 

@@ -14,8 +14,8 @@ from accuracy import paper, tables
 from accuracy.paper import MODELS, SEEDS, TABLES
 from accuracy.tables import Place
 from lever_sil.study import no_accelerometer
-from lever_sil.study.compare import campaign, protocols
 from lever_sil.study.compare import paper as experiment
+from lever_sil.study.compare import protocols, run_cases
 from lever_sil.study.compare.cases import Plan, Protocol, cases
 from lever_sil.study.compare.entrants import entrants, tuning_name, wrongly_tuned
 
@@ -85,7 +85,7 @@ def test_what_the_page_says_of_the_protocols_is_in_their_tables(root: Path) -> N
 
 def test_a_row_of_the_experiment_is_that_of_the_runs(root: Path) -> None:
     names = [name for name in experiment.names() if name.startswith("paper_linear_physical_constant")]
-    results = campaign.run(campaign.tasks(names, ["rls"], Plan(SEEDS)), jobs=1)
+    results = run_cases.run(run_cases.tasks(names, ["rls"], Plan(SEEDS)), jobs=1)
     (rows,) = experiment.tables(results).values()
     header, _, *table = written(root, PLACES["experiment, linear_physical"])
     there = next(row for row in table if row[:2] == ["constant", "rls"])
@@ -97,7 +97,7 @@ def test_a_row_of_wrong_tuning_is_that_of_the_runs(root: Path) -> None:
     header, _, *table = written(root, PLACES["wrong tuning"])
     row = dict(zip(header, next(row for row in table if row[0] == "r × 0.1, q × 10"), strict=True))
     case, name = cases()["wrong_tuning_fixed"], tuning_name({"r": "0.1", "q": "10"})
-    results = campaign.run([campaign.Task(case.name, name, Plan(SEEDS))], jobs=1)
+    results = run_cases.run([run_cases.Task(case.name, name, Plan(SEEDS))], jobs=1)
     rms = 100.0 * experiment.of_runs(results.outcomes[case.name, name], case, results.plan).rms
     assert max(rms) == pytest.approx(float(row["fixed: rms [%]"].split(" / ")[1]), abs=1.0)
     right = float(dict(zip(header, table[0], strict=True))["fixed: rms [%]"].split(" / ")[1])

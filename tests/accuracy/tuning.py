@@ -16,7 +16,7 @@ from lever_cdkf.tune import recording
 from lever_cdkf.tune.calibration import Calibrated, calibrate
 from lever_cdkf.tune.likelihood import Likelihood
 from lever_cdkf.tune.search import Search, Tuned, groups
-from lever_sil.envelope import motions, plant, sensors
+from lever_sil.batch import motions, plant, sensors
 from lever_sil.run import buslog, runner
 from lever_sil.scenarios import scenario
 

@@ -12,10 +12,10 @@ from pathlib import Path
 sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
 from benchmark import benchmark  # noqa: E402
+from lever_cdkf.cli.progress import Progress  # noqa: E402
+from lever_cdkf.cli.tables import Row, print_tables  # noqa: E402
 from lever_cdkf.errors import LeverError  # noqa: E402
-from lever_cdkf.files import write_text  # noqa: E402
-from lever_cdkf.progress import Progress  # noqa: E402
-from lever_cdkf.tables import Row, print_tables  # noqa: E402
+from lever_cdkf.runtime.files import write_text  # noqa: E402
 
 _BUILD = Path(__file__).resolve().parents[2] / "build"
 

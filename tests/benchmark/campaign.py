@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from lever_cdkf.tables import Row, print_tables
+from lever_cdkf.cli.tables import Row, print_tables
 from lever_sil.campaign import chunks, design, maps, session, spec, summary
 from lever_sil.campaign.chunks import Chunk, Plan
 

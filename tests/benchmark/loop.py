@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import time
 
-from lever_cdkf.tables import Row, print_tables
+from lever_cdkf.cli.tables import Row, print_tables
 from lever_sil import fast
 from lever_sil.scenarios import scenario
 from lever_sil.scenarios.scenario import Scenario

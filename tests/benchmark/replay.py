@@ -26,7 +26,7 @@ import numpy as np
 from lever_cdkf.can import bulk, codec
 from lever_cdkf.can.bus import LeverBus
 from lever_cdkf.can.logs import Recording
-from lever_cdkf.tables import Row, print_tables
+from lever_cdkf.cli.tables import Row, print_tables
 from lever_sil.run.runner import simulate
 from lever_sil.scenarios import scenario
 
@@ -58,8 +58,8 @@ def shifted(minute: bulk.Frames, number: int) -> bulk.Frames:
 
 MEASURED = """
 import resource, sys
-from lever_cdkf import cli
-status = cli.main(sys.argv[1:])
+from lever_cdkf.cli.main import main
+status = main(sys.argv[1:])
 used = resource.getrusage(resource.RUSAGE_SELF)
 with open("/proc/self/status") as file:  # ru_maxrss would be this process's or its parent's, whichever was larger
     memory = next(line.split()[1] for line in file if line.startswith("VmHWM"))

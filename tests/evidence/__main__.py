@@ -31,8 +31,8 @@ from evidence import page, results
 from evidence.results import EvidenceError
 from fuzz import libfuzzer
 from lever_cdkf.errors import LeverError
-from lever_cdkf.files import Outputs, json_text
-from lever_cdkf.provenance import provenance
+from lever_cdkf.runtime.files import Outputs, json_text
+from lever_cdkf.runtime.provenance import provenance
 from proof import eva
 from quality import tools, tracing
 

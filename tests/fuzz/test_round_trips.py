@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
+from lever_cdkf.cli.formats import FORMATS
 from lever_cdkf.exports.signal_files import SignalFiles
-from lever_cdkf.formats import FORMATS
-from lever_cdkf.provenance import provenance
 from lever_cdkf.results.trace import Trace
+from lever_cdkf.runtime.provenance import provenance
 from lever_cdkf.signals import tables
 
 TOLERANCE = {"csv": (0.0, 5.1e-7), "mf4": (2.0**-24, 1e-45), "parquet": (2.0**-24, 1e-45)}

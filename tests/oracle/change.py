@@ -1,7 +1,7 @@
 """Detection of a sudden change of the pilot: the corrections of w, white as long as all is right, point one way."""
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 
 LONG = 100.0  # memory of the average of the statistic, in memories of the sum
 

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.models.detrend import Detrend
 from lever_cdkf.models.lever import Lever
 from lever_cdkf.models.linear import Hand, LinearBlackBox, LinearPhysical
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from . import cdkf

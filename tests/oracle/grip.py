@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.models.detrend import Detrend
 from lever_cdkf.models.lever import Lever
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.numeric.arrays import Array
+from lever_cdkf.text.units import GRAVITY
 
 from .learning import seconds
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from .belief import Belief, Innovation, StepScore, TwoStage

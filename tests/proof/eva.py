@@ -21,7 +21,8 @@ SOURCES = {
     "e2e": ("can/e2e.c",),
     "kernels": ("math/trigonometry.c",),
     "link": (
-        *("app/link.c", "app/link_out.c", "app/lever.c", "app/instance.c", "app/bounce.c", "app/settings.c", "app/verdict.c"),
+        *("app/link.c", "app/link_out.c", "app/lever.c", "app/instance.c", "app/bounce.c", "app/settings.c"),
+        "app/verdict.c",
         *("can/e2e.c", "can/layout.c", "can/messages.c", "can/messages_sample.c"),
     ),
     "settings_text": ("port/linux/settings.c", "app/settings.c"),

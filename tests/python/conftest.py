@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import can
 import pytest
-from lever_cdkf import cli
 from lever_cdkf.can import codec
 from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import CHOICES
 from lever_cdkf.firmware.library import enum_names
 from lever_cdkf.firmware.native import Config
-from lever_sil.run.runner import Result, simulate
+from lever_sil.run.runner import SimulationResult, simulate
 from lever_sil.scenarios import scenario
 from lever_sil.scenarios.scenario import Scenario
 
@@ -103,7 +103,7 @@ def lever(capsys: pytest.CaptureFixture[str]) -> Run:
 
     def run(*arguments: str | Path) -> tuple[int, str, str]:
         capsys.readouterr()
-        status = cli.main([str(argument) for argument in arguments])
+        status = main([str(argument) for argument in arguments])
         return status, *capsys.readouterr()
 
     return run
@@ -237,7 +237,7 @@ SHORT = ["duration=6 s", "converged_after=2 s", "limits={}"]
 class Session:
     """A simulation and the log it left."""
 
-    result: Result
+    result: SimulationResult
     folder: Path
     config: Config
     """Of its estimator."""

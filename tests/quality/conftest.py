@@ -13,7 +13,7 @@ import cantools
 import numpy as np
 import pytest
 from lever_sil.run import buslog
-from lever_sil.run.runner import Result, simulate
+from lever_sil.run.runner import SimulationResult, simulate
 from lever_sil.scenarios import scenario
 from quality import tools
 
@@ -117,7 +117,7 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def simulated(folder: Path, seconds: float) -> Result:
+def simulated(folder: Path, seconds: float) -> SimulationResult:
     """Return a run, which leaves its log in a folder."""
     steady = scenario.load("steady", [f"duration={seconds} s", "converged_after=2 s", "limits={}"])
     result = simulate(steady, channel="vcan0")

@@ -7,7 +7,7 @@ from argparse import ArgumentParser
 
 import pytest
 import readmes
-from lever_cdkf import cli
+from lever_cdkf.cli.main import _parser
 from quality import tools
 from quality.conftest import SourceTree
 
@@ -46,7 +46,7 @@ echo theta_noise = 1 mrad | tee my.settings > old.settings
 
 
 def parsers() -> dict[str, ArgumentParser]:
-    parser = cli._parser()
+    parser = _parser()
     assert parser._subparsers is not None
     return {"": parser, **parser._subparsers._group_actions[0].choices}  # type: ignore[dict-item]
 
@@ -73,7 +73,7 @@ def test_every_command_has_examples_and_every_reason_is_needed() -> None:
 def test_examples_can_be_typed(command: str) -> None:
     for line in examples(command):
         for arguments in readmes.lever_commands(line):
-            assert cli._parser().parse_args(arguments)
+            assert _parser().parse_args(arguments)
 
 
 @pytest.mark.parametrize("command", [name for name in parsers() if any(not reason(line) for line in examples(name))])

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 import readmes
-from lever_cdkf import cli
+from lever_cdkf.cli.main import _parser
 from lever_cdkf.signals.mapping import read_mapping
 from quality import tools
 from quality.conftest import SourceTree
@@ -149,7 +149,7 @@ def test_what_is_not_run_says_why_and_can_be_typed(page: Path) -> None:
     assert len(reasons) == fences.count("console")
     for block in readmes.blocks(page, "console").values():
         for command in readmes.lever_commands(block):
-            cli._parser().parse_args(command)
+            _parser().parse_args(command)
 
 
 def test_a_mapping_file_is_one(tmp_path: Path) -> None:

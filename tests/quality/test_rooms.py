@@ -15,7 +15,13 @@ PACKAGES = {"lever_cdkf": "host_tools", "lever_sil": "sil"}
 """Where each is."""
 PUBLIC = "lever_cdkf/__init__.py"
 """Not judged: imports the public names of both packages, each when it is first used."""
+FOR_ALL = {"numeric", "runtime", "text"}
+"""Folders that every folder may import."""
 MAY_IMPORT = {
+    "lever_cdkf/runtime": set(),
+    "lever_cdkf/numeric": set(),
+    "lever_cdkf/text": {"runtime"},
+    "lever_cdkf/cli": {"runtime"},
     "lever_cdkf/firmware": set(),
     "lever_cdkf/models": set(),
     "lever_cdkf/board": set(),
@@ -23,17 +29,18 @@ MAY_IMPORT = {
     "lever_cdkf/results": {"firmware"},
     "lever_cdkf/report": {"firmware", "models", "results"},
     "lever_cdkf/signals": {"firmware", "can", "results", "exports"},
-    "lever_cdkf/exports": {"firmware", "can", "results"},
-    "lever_cdkf/replay": {"firmware", "can", "results", "report", "signals", "exports"},
-    "lever_cdkf/tune": {"firmware", "can", "results", "report", "signals"},
-    "lever_cdkf/watch": {"firmware", "models", "can", "results", "report", "signals"},
+    "lever_cdkf/exports": {"cli", "firmware", "can", "results"},
+    "lever_cdkf/replay": {"cli", "firmware", "can", "results", "report", "signals", "exports"},
+    "lever_cdkf/tune": {"cli", "firmware", "can", "results", "report", "signals"},
+    "lever_cdkf/watch": {"cli", "firmware", "models", "can", "results", "report", "signals"},
     "lever_cdkf/fmu": {"firmware"},
-    "lever_cdkf/commands": {"firmware", "board", "fmu", "can", "results", "replay", "tune", "watch", "signals"},
+    "lever_cdkf/commands": {"cli", "firmware", "board", "fmu", "can", "results", "replay", "tune", "watch", "signals"},
     "lever_sil/plants": {"models"},
     "lever_sil/aircraft": {"firmware", "models"},
     "lever_sil/scenarios": {"plants", "aircraft", "firmware", "can", "results"},
     "lever_sil/fast": {"scenarios", "plants", "aircraft", "firmware", "can"},
     "lever_sil/run": {
+        "cli",
         "fast",
         "scenarios",
         "plants",
@@ -46,25 +53,26 @@ MAY_IMPORT = {
         "exports",
     },
     "lever_sil/pilot_fmu": {"fast", "scenarios", "firmware", "fmu"},
-    "lever_sil/judged": {"report"},
-    "lever_sil/envelope": {"judged", "fast", "plants", "firmware", "models", "report"},
+    "lever_sil/batch": {"fast", "plants", "firmware", "models"},
+    "lever_sil/acceptance": {"cli", "report"},
+    "lever_sil/envelope": {"acceptance", "batch", "fast", "plants", "firmware", "models", "report"},
     "lever_sil/bounce": {
-        *("judged", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
+        *("acceptance", "batch", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
         *("firmware", "models", "report"),
     },
-    "lever_sil/faults": {"fast", "envelope", "firmware", "can", "report"},
-    "lever_sil/soak": {"fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
+    "lever_sil/faults": {"cli", "batch", "fast", "envelope", "firmware", "can", "report"},
+    "lever_sil/soak": {"cli", "fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
     "lever_sil/study": {
-        *("run", "fast", "scenarios", "plants", "envelope"),
+        *("cli", "run", "fast", "scenarios", "plants", "batch", "envelope"),
         *("firmware", "models", "can", "results", "report", "exports"),
     },
-    "lever_sil/campaign": {"fast", "run", "scenarios", "study", "firmware", "results", "report"},
+    "lever_sil/campaign": {"cli", "fast", "run", "scenarios", "study", "firmware", "results", "report"},
     "lever_sil/commands": {
-        *("campaign", "run", "scenarios", "study", "judged", "envelope", "bounce", "faults", "soak", "aircraft"),
-        *("firmware", "can", "report", "exports", "fmu", "pilot_fmu"),
+        *("campaign", "run", "scenarios", "study", "acceptance", "envelope", "bounce", "faults", "soak", "aircraft"),
+        *("cli", "firmware", "can", "report", "exports", "fmu", "pilot_fmu"),
     },
 }
-"""By folder. What lies beside the folders is for all of its package, and imports nothing in them; lever_sil may import
+"""By folder. What lies beside the folders is for all of its package, and imports FOR_ALL at most; lever_sil may import
 that of lever_cdkf too. Plants and oracle are what the firmware is compared with, and know neither it nor each other."""
 ORACLE = "tests/oracle"
 
@@ -90,6 +98,11 @@ def place(path: str, root: Path) -> str:
     return "/".join(parts[:2]) if len(parts) > 1 and (root / PACKAGES[parts[0]] / parts[0] / parts[1]).is_dir() else ""
 
 
+def may_import(folder: str) -> set[str]:
+    """Return the folders that a folder may import, or what lies beside the folders: ""."""
+    return MAY_IMPORT.get(folder, set()) | (set() if folder.split("/")[-1] in FOR_ALL else FOR_ALL)
+
+
 def wrong_imports(root: Path) -> list[str]:
     found = []
     files = {
@@ -104,7 +117,7 @@ def wrong_imports(root: Path) -> list[str]:
         for path in imported(file, importer):
             there = place(path, root)
             from_sil = path.split("/")[0] == "lever_sil" and importer.startswith("lever_cdkf/")
-            allowed = there in ("", here) or there.split("/")[1] in MAY_IMPORT.get(here, set())
+            allowed = there in ("", here) or there.split("/")[1] in may_import(here)
             if from_sil or not allowed:
                 found.append(f"{importer} imports {path}")
     return found
@@ -115,11 +128,12 @@ def test_each_folder_imports_only_what_it_may() -> None:
 
 
 def test_the_oracle_imports_models_only() -> None:
+    allowed = {"", "lever_cdkf/models", *(f"lever_cdkf/{folder}" for folder in FOR_ALL)}
     found = {
         path
         for file in (tools.ROOT / ORACLE).glob("*.py")
         for path in imported(file, f"{ORACLE}/{file.name}")
-        if place(path, tools.ROOT) not in ("", "lever_cdkf/models") or path.startswith("lever_sil/")
+        if place(path, tools.ROOT) not in allowed or path.startswith("lever_sil/")
     }
     assert not found
 
@@ -135,9 +149,7 @@ def test_every_folder_has_its_row() -> None:
 
 def test_there_is_an_order() -> None:
     """No folder imports, through others, itself."""
-    left = {
-        folder: {each for each in MAY_IMPORT if each.split("/")[1] in names} for folder, names in MAY_IMPORT.items()
-    }
+    left = {folder: {each for each in MAY_IMPORT if each.split("/")[1] in may_import(folder)} for folder in MAY_IMPORT}
     while ready := {folder for folder, needs in left.items() if not needs & left.keys()}:
         left = {folder: needs for folder, needs in left.items() if folder not in ready}
     assert not left
@@ -147,14 +159,14 @@ def test_there_is_an_order() -> None:
     ("file", "line"),
     [
         ("lever_cdkf/watch/state.py", "from lever_sil.toml_tables import read"),
-        ("lever_cdkf/files.py", "import lever_sil"),
+        ("lever_cdkf/runtime/files.py", "import lever_sil"),
         ("lever_cdkf/firmware/config.py", "    from ..can import codec"),
         ("lever_cdkf/errors.py", "from .can.codec import decode"),
         ("lever_sil/plants/truth.py", "from lever_cdkf.firmware import native"),
     ],
 )
 def test_a_wrong_import_is_found(file: str, line: str, tmp_path: Path) -> None:
-    for name in ("lever_cdkf/can", "lever_cdkf/firmware", "lever_cdkf/watch", "lever_sil/plants"):
+    for name in ("lever_cdkf/can", "lever_cdkf/firmware", "lever_cdkf/runtime", "lever_cdkf/watch", "lever_sil/plants"):
         (tmp_path / PACKAGES[name.split("/")[0]] / name).mkdir(parents=True)
     text = f"def late():\n{line}\n" if line[0] == " " else line
     (tmp_path / PACKAGES[file.split("/")[0]] / file).write_text(text)

@@ -18,7 +18,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from lever_cdkf.extras import hide_mf4
+from lever_cdkf.runtime.extras import hide_mf4
 from vcan import place, uml
 
 INSIDE = os.environ.get(place.INSIDE) == "1"

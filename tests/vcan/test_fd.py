@@ -17,7 +17,7 @@ BO_ 512 Everything: 24 FCC
  SG_ Angle : 64|16@1- (0.005,0) [-90|90] "deg" FCC
  SG_ Acceleration : 160|16@1- (0.0002,0) [-6|6] "g" FCC
 """
-LEVER = [sys.executable, "-m", "lever_cdkf.cli"]
+LEVER = [sys.executable, "-m", "lever_cdkf.cli.main"]
 FD_MTU = "72"
 
 

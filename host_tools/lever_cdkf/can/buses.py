@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ..errors import LeverError
-from ..extras import pip_install
+from ..runtime.extras import pip_install
 from .identifiers import add_identifier_options, translate_bus
 
 if TYPE_CHECKING:

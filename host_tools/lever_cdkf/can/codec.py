@@ -26,7 +26,7 @@ from e2e.crc import calculate_crc8_h2f
 from e2e.p02 import e2e_p02_check, e2e_p02_protect
 
 from ..errors import CodecError
-from ..files import native_file
+from ..runtime.files import native_file
 
 if TYPE_CHECKING:
     import numpy as np

@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import LeverError
-from ..extras import require
-from ..unheard import unheard
+from ..runtime.extras import require
+from ..runtime.quiet_asammdf import quiet_asammdf
 from . import identifiers
 from .bulk import ERROR, EXTENDED, FD, FRAME, LONGEST_LINE, REMOTE, Buses, Frames, parse
 
@@ -191,7 +191,7 @@ def _open_log(path: str) -> Any:
     """python-can's reader. Raises LogError, and OSError for what the system says."""
     import can
 
-    with unheard():
+    with quiet_asammdf():
         try:
             return can.LogReader(path)
         except Exception as error:  # each format has its own, from struct.error to those of asammdf

@@ -13,7 +13,7 @@ _MARK_PERIOD = 0.1  # [s]
 _EVENTS = ("COMMAND",)  # may have several senders, each with its own counter
 
 
-class Traffic:
+class MessageCounter:
     """One message of lever.dbc as it passes. Counts are since the start or clear().
 
     A loss is told by a gap in the counter, which counts to 16: of up to 14 frames lost in a row all are seen, 15 look

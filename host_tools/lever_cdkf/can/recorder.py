@@ -15,7 +15,7 @@ import can
 from ..errors import LeverError
 from . import codec
 from .identifiers import from_bus
-from .message_counts import Traffic
+from .message_counts import MessageCounter
 
 PARTIAL = ".partial"
 """Ending of a log that is being recorded, or whose recording broke off."""
@@ -39,7 +39,7 @@ class Recorder:
         self.error_frames = 0
         self.others = 0
         """Frames that are in no message of lever.dbc."""
-        self.messages = {each.frame_id: Traffic(each.name) for each in codec.database().messages}
+        self.messages = {each.frame_id: MessageCounter(each.name) for each in codec.database().messages}
         self.bus_state = "active"
         """Of the controller, as error frames or the interface tell: active, warning, passive, bus off, error."""
         self.left_active = 0

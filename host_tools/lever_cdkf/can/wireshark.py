@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..files import Outputs, write_text
+from ..runtime.files import Outputs, write_text
 from . import identifiers
 from .codec import database
 

@@ -1,1 +1,1 @@
-"""Sub-commands of `lever`, a module each: ../cli.py says what such a module has; pyproject.toml lists them."""
+"""Sub-commands of `lever`, a module each: ../cli/main.py says what such a module has; pyproject.toml lists them."""

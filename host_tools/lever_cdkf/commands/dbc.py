@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..can.identifiers import add_identifier_options, chosen, shifted_dbc, word
+from ..cli.layout import say
+from ..cli.tables import Row, add_json_option
 from ..errors import LeverError
-from ..layout import say
-from ..tables import Row, add_json_option
 
 if TYPE_CHECKING:
     from cantools.database.can import Message, Signal
@@ -51,8 +51,8 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..files import native_file
-    from ..tables import print_tables
+    from ..cli.tables import print_tables
+    from ..runtime.files import native_file
 
     if args.text:
         print(shifted_dbc(native_file("lever.dbc").read_text(encoding="utf-8")), end="")

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import LeverError
-from ..extras import pip_install
+from ..runtime.extras import pip_install
 
 IMAGES = Path("build/stm32f4")
 DEFAULT_IMAGE = IMAGES / "lever_stm32f4_can.elf"

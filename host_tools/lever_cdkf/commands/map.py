@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import layout
+from ..cli import layout
+from ..cli.tables import Row, add_json_option
 from ..errors import LeverError
-from ..files import check_not_input
-from ..tables import Row, add_json_option
+from ..runtime.files import check_not_input
 from .signal_options import add_part_options, check_part
 
 if TYPE_CHECKING:
@@ -56,13 +56,13 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..files import write_text
-    from ..provenance import provenance
+    from ..cli.tables import print_tables
+    from ..runtime.files import write_text
+    from ..runtime.provenance import provenance
     from ..signals.mapping import as_toml
     from ..signals.plots import KINDS, OTHER, write
     from ..signals.proposal import propose
     from ..signals.recorded import notes_of
-    from ..tables import print_tables
 
     start, length = check_part(args)
     read = [args.log, *([args.dbc] if args.dbc else [])]

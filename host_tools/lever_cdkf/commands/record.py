@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options, open_bus
+from ..cli.layout import say
+from ..cli.tables import Row, Tables, add_json_option
 from ..errors import LeverError
-from ..layout import say
-from ..tables import Row, Tables, add_json_option
 from .signal_options import add_signal_options, input_files
 
 if TYPE_CHECKING:
@@ -54,9 +54,9 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     from ..can.recorder import Recorder
-    from ..files import write_text
-    from ..provenance import provenance
-    from ..tables import print_tables
+    from ..cli.tables import print_tables
+    from ..runtime.files import write_text
+    from ..runtime.provenance import provenance
 
     out = args.out or Path(time.strftime("lever_%Y%m%d_%H%M%S.log"))
     if args.interface is None:

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..can.identifiers import add_identifier_options
-from ..files import check_not_input
-from ..formats import add_format_option, chosen_formats
-from ..layout import say
-from ..tables import Row, Tables, add_json_option
+from ..cli.formats import add_format_option, chosen_formats
+from ..cli.layout import say
+from ..cli.tables import Row, Tables, add_json_option
+from ..runtime.files import check_not_input
 from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_aircraft, chosen_reading, input_files
 
 if TYPE_CHECKING:
@@ -95,11 +95,11 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    from ..progress import Progress
+    from ..cli.progress import Progress
+    from ..cli.tables import print_tables
     from ..replay.engine import replay
     from ..replay.outputs import FILES
     from ..replay.summary import failure
-    from ..tables import print_tables
 
     check_not_input(args.json, args.logs)
     if args.each:
@@ -119,11 +119,11 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _run_each(args: argparse.Namespace) -> int:
+    from ..cli.progress import Progress
+    from ..cli.tables import print_tables
     from ..firmware.settings_file import make_config
-    from ..progress import Progress
     from ..replay.each import replay_each, rows_of, write
     from ..signals.mapping import read_mapping
-    from ..tables import print_tables
 
     make_config(_assignments(args))  # what is wrong with the command line is wrong for all
     if args.map:

@@ -7,7 +7,7 @@ import dataclasses
 import sys
 from typing import Any
 
-from ..tables import Row, add_json_option
+from ..cli.tables import Row, add_json_option
 
 _DESCRIPTION = """\
 Without --set and --settings: prints every setting of the estimator with unit, default, range and meaning, after the
@@ -43,8 +43,8 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from ..cli.tables import print_tables, write_json
     from ..firmware.settings_file import format_config, make_config, parse_assignment, read_assignments
-    from ..tables import print_tables, write_json
 
     assignments = read_assignments(args.settings) if args.settings is not None else {}
     assignments |= dict(parse_assignment(text) for text in args.set)

@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..can.identifiers import add_identifier_options
+from ..cli.layout import command_lines, say, terminal_width
+from ..cli.tables import Row, Tables, add_json_option
 from ..errors import LeverError
-from ..extras import require
-from ..files import check_not_input
-from ..layout import command_lines, say, terminal_width
-from ..tables import Row, Tables, add_json_option
+from ..runtime.extras import require
+from ..runtime.files import check_not_input
 from .signal_options import MAP_HELP, add_signal_options, chosen_reading, input_files
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
     if args.page is not None:
         require("report")
 
-    from ..progress import Progress
+    from ..cli.progress import Progress
     from ..tune import validation
     from ..tune.calibration import calibrate
     from ..tune.likelihood import Likelihood
@@ -189,9 +189,9 @@ def _conclude(
     fits: Sequence[Fit],
 ) -> int:
     """Print and write everything; return the exit status."""
-    from ..files import write_text
-    from ..provenance import provenance, with_provenance
-    from ..tables import print_tables
+    from ..cli.tables import print_tables
+    from ..runtime.files import write_text
+    from ..runtime.provenance import provenance, with_provenance
     from ..tune import validation
 
     tables: Tables = {"settings": [_setting_row(entry) for entry in tuned], "before and after": _fit_rows(fits)}
@@ -227,7 +227,7 @@ def _conclude(
 
 def _refuse(args: argparse.Namespace, likelihood: Likelihood, calibration: Calibration) -> int:
     """Say what was found, why it is not believed, and what to try; the exit status."""
-    from ..tables import print_tables
+    from ..cli.tables import print_tables
     from ..tune.likelihood import SHORTEST
     from ..tune.search import NOISE
 

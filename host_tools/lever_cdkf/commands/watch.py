@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options
 from ..errors import LeverError
-from ..extras import require
+from ..runtime.extras import require
 from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_aircraft, chosen_reading
 
 if TYPE_CHECKING:

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
 from ..can import codec
 from ..firmware.estimator import fault_names
 from ..firmware.library import enum_names
 from ..firmware.quantities import quantities, recorded_name
+from ..numeric.arrays import FloatArray
 from ..results.feedthrough import FEEDTHROUGH
 from ..results.trace import CORRECTION, ESTIMATED, HEALTH, MEASURED, STABILITY, TRUE_MARGIN, quantity_fields
 

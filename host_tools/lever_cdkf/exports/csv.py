@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..files import writing
 from ..results.trace import Trace, write_csv_header, write_csv_rows
+from ..runtime.files import writing
 from .head import Head
 
 

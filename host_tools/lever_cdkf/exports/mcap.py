@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..can import codec
-from ..extras import require
-from ..files import writing
 from ..results.trace import Trace
+from ..runtime.extras import require
+from ..runtime.files import writing
 from .columns import RECORDED, TEXT, Column, as_words, together
 from .head import Head
 

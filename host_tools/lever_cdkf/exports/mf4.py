@@ -18,11 +18,11 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
 from ..can import codec
-from ..extras import require
-from ..files import writing
+from ..numeric.arrays import FloatArray
 from ..results.trace import Trace
+from ..runtime.extras import require
+from ..runtime.files import writing
 from .columns import RECORDED, TEXT, TRUTH, Column, together, words
 from .head import Head
 

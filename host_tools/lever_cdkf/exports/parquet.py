@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
-from ..extras import require
-from ..files import writing
+from ..numeric.arrays import FloatArray
 from ..results.trace import WHOLE, Trace
+from ..runtime.extras import require
+from ..runtime.files import writing
 from .columns import TEXT, as_words
 from .head import Head
 

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from ..provenance import Provenance
+from ..runtime.provenance import Provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

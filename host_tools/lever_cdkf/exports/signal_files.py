@@ -11,9 +11,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..formats import FORMATS
-from ..provenance import Provenance
+from ..cli.formats import FORMATS
 from ..results.trace import Trace
+from ..runtime.provenance import Provenance
 from .columns import columns
 from .csv import Csv
 from .head import Head

@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import LeverError
-from ..units import number_of
+from ..text.units import number_of
 from .library import ffi, lib
 from .settings_file import lines_of
 

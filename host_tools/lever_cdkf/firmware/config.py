@@ -9,7 +9,7 @@ from numbers import Real
 from typing import Any, NamedTuple
 
 from ..errors import SettingsError
-from ..near_names import did_you_mean
+from ..text.suggestions import did_you_mean
 from .library import enum_names, ffi, lib
 
 CHOICES = ("model", "preload", "estimator", "adaptation", "mitigation")

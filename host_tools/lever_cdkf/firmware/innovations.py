@@ -9,8 +9,8 @@ import threading
 
 import numpy as np
 
-from ..arrays import Array
 from ..errors import LeverError
+from ..numeric.arrays import Array
 from .config import Config
 from .estimator import Health, health_of
 from .library import ffi, load, struct_dtype

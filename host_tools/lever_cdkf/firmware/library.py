@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import cffi
 
 from ..errors import LeverError
-from ..files import native_file, shared_library
+from ..runtime.files import native_file, shared_library
 
 if TYPE_CHECKING:
     import numpy as np

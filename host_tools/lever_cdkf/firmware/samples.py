@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
 from ..errors import LeverError
-from ..slope import in_degrees
+from ..numeric.arrays import FloatArray
+from ..numeric.derivative import in_degrees
 from .library import struct_dtype
 
 _GREATEST = {"theta": (math.pi, "rad"), "theta_dot": (20.0, "rad/s")}

@@ -14,9 +14,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import units
 from ..errors import SettingsError
-from ..units import UnitError
+from ..text import units
+from ..text.units import UnitError
 from .config import CHOICES, Config, Setting, choice_value, setting, settings_table
 from .library import enum_names
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
-from ..files import check_writable, native_file, whole
-from ..provenance import created, provenance
+from ..runtime.files import check_writable, native_file, whole
+from ..runtime.provenance import created, provenance
 from .binary import compile_library, compiler, headers, library_suffix, platform_tuple
 from .description import Model, build_description, model_description
 

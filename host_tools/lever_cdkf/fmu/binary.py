@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ..errors import LeverError
-from ..extras import require
+from ..runtime.extras import require
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-fno-math-errno")
 _EXPORT = '-DFMI3_Export=__attribute__((visibility("default")))'

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from .. import units
 from ..firmware.library import enum_names
-from ..provenance import SOFTWARE, created, version
+from ..runtime.provenance import SOFTWARE, created, version
+from ..text import units
 from .dimension import base_units
 from .variables import Variable
 

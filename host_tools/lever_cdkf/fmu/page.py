@@ -8,7 +8,7 @@ from importlib.resources import files
 from string import Template
 
 from ..firmware.library import enum_names
-from ..provenance import provenance, with_provenance
+from ..runtime.provenance import provenance, with_provenance
 from .description import Model
 from .variables import Variable
 

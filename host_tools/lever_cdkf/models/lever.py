@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
-from ..units import GRAVITY
+from ..numeric.arrays import Array
+from ..text.units import GRAVITY
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
+from ..numeric.arrays import Array
 from .lever import Lever
 
 Inputs = tuple[float | Array, ...]

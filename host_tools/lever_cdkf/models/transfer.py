@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import ComplexArray, FloatArray
+from ..numeric.arrays import ComplexArray, FloatArray
 
 BAND = (2.0, 8.0)
 """Where collective bounce lives [Hz]: the mode that answers most in it is the dominant one."""

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
 from ..can import fields
 from ..can.bulk import RECORDED, SLOTS, Rows
 from ..can.fields import COUNTS
 from ..firmware.library import enum_names
 from ..firmware.quantities import recorded_name
+from ..numeric.arrays import FloatArray
 from ..results.feedthrough import FEEDTHROUGH
 from ..results.trace import CORRECTION, ESTIMATED, HEALTH, MEASURED, STABILITY, Trace, quantity_fields
 from .timeline import Timeline

@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..cli.tables import Row
 from ..errors import LeverError
-from ..extras import missing, require
-from ..files import Outputs
 from ..firmware.quantities import Quantity, quantities
-from ..provenance import Provenance, provenance, with_provenance
+from ..numeric.arrays import FloatArray
 from ..report.figure import SERIES, Figure, axis, line, time_axis
 from ..report.page import Page
 from ..report.series import spread_indices
 from ..report.summary_html import number, table
 from ..results.summary import ReplaySummary
-from ..tables import Row
+from ..runtime.extras import missing, require
+from ..runtime.files import Outputs
+from ..runtime.provenance import Provenance, provenance, with_provenance
 from .engine import Options, Progress, replay
 from .summary import failure
 

@@ -10,26 +10,26 @@ from typing import Protocol
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..can import codec
 from ..can.bulk import FRAME, RECORDED, SLOTS, Feeder, Frames, Rows
+from ..can.estimator_frames import EstimatorFrames
 from ..can.identity import Identity
 from ..can.logs import Recording
-from ..can.traffic import Traffic
 from ..exports.signal_files import calendar
-from ..extras import missing
-from ..files import Outputs, write_text
 from ..firmware.aircraft import AircraftResponse
 from ..firmware.library import enum_names
 from ..firmware.native import Config, Estimator
-from ..provenance import printable, provenance
+from ..numeric.arrays import FloatArray
 from ..report import write_page
 from ..results import summary as summaries
 from ..results.faults import OPTIONAL
 from ..results.summary import RecordingSummary, ReplaySummary
 from ..results.trace import Trace
+from ..runtime.extras import missing
+from ..runtime.files import Outputs, write_text
+from ..runtime.provenance import printable, provenance
+from ..signals.mapped_frames import MappedFrames
 from ..signals.reading import Reading
-from ..signals.traffic import MappedTraffic
 from .columns import Columns, model_numbers
 from .commands_in_log import Commands
 from .comparison import Comparison
@@ -85,11 +85,11 @@ def replay(
     the signals, report.html (with the extra `report`) and summary.json there, all or none, and hands the trace,
     reduced, to `keep`. Raise LeverError, also rather than write over a log."""
     logs = list(logs)
-    traffic: Traffic | MappedTraffic
+    traffic: EstimatorFrames | MappedFrames
     if options.reading is None:
-        traffic = Traffic(Recording(logs), options.channel, options.start, options.length)
+        traffic = EstimatorFrames(Recording(logs), options.channel, options.start, options.length)
     else:
-        traffic = MappedTraffic(logs, options.reading, progress)
+        traffic = MappedFrames(logs, options.reading, progress)
         options = replace(options, config=traffic.at_its_rate(options.config))
     with ExitStack() as stack:
         folder = None
@@ -110,7 +110,7 @@ def replay(
 class _Replay:
     """The parts, joined."""
 
-    def __init__(self, traffic: Traffic | MappedTraffic, options: Options, folder: Folder | None) -> None:
+    def __init__(self, traffic: EstimatorFrames | MappedFrames, options: Options, folder: Folder | None) -> None:
         self._traffic, self._options, self._folder = traffic, options, folder
         self._feeder = Feeder(self._new_estimator())
         self._proof = Proof(self._feeder.estimator, self._new_estimator, options.chosen)
@@ -211,7 +211,7 @@ class _Replay:
 
     def _absent(self) -> tuple[str, ...]:
         """Return faults of inputs that the mapping does not have."""
-        if not isinstance(self._traffic, MappedTraffic):
+        if not isinstance(self._traffic, MappedFrames):
             return ()
         return tuple(fault for fault, key in OPTIONAL.items() if key not in self._traffic.loaded.inputs)
 
@@ -279,7 +279,7 @@ class _Replay:
             clock_wraps=clocks.wraps,
             clock_restarts=clocks.restarts,
             recorder_clock_jumps=clocks.recorder_jumps,
-            mapping=traffic.loaded.summary() if isinstance(traffic, MappedTraffic) else None,
+            mapping=traffic.loaded.summary() if isinstance(traffic, MappedFrames) else None,
         )
 
     def finish(self, folder: Folder, summary: ReplaySummary) -> ReplaySummary:

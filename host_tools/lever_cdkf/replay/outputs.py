@@ -9,10 +9,10 @@ from types import TracebackType
 
 from ..can import bulk
 from ..can.bulk import Frames
+from ..cli.formats import FORMATS
 from ..exports.signal_files import SignalFiles
-from ..files import Outputs, writing
-from ..formats import FORMATS
-from ..provenance import Provenance
+from ..runtime.files import Outputs, writing
+from ..runtime.provenance import Provenance
 
 BUS_LOG, SUMMARY = "bus.log", "summary.json"
 """The summary is the last file to be in its place: where it is, the others are of the same replay."""

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..numeric.arrays import FloatArray
 from ..report.bode import LONGEST_STEP, slow_trim
 from ..report.run import COHERENT, Averages, Run, nis_averages
 from ..report.series import Welch

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
+from ..numeric.arrays import FloatArray
 
 Trace = Mapping[str, FloatArray]
 Reduce = Callable[[FloatArray], FloatArray]

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..can import codec
 from ..can.bulk import Frames
-from ..can.traffic import INPUTS
+from ..can.estimator_frames import INPUTS
 
 
 class Repeats:

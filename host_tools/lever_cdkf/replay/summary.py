@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..can.traffic import why_refused
+from ..can.estimator_frames import why_refused
 from ..firmware.native import Config, enum_names
 from ..firmware.quantities import quantities
 from ..results import bounce, nis, trust, whiteness

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import IntArray
+from ..numeric.arrays import IntArray
 
 WRAP = 1 << 32
 AGREEMENT = 1_000_000

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-from ..files import write_text
-from ..provenance import with_provenance
+from ..runtime.files import write_text
+from ..runtime.provenance import with_provenance
 
 if TYPE_CHECKING:
     from ..results.summary import Summary

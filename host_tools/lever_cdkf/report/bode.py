@@ -4,10 +4,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ..arrays import Array, ComplexArray
 from ..models.detrend import Detrend
 from ..models.lever import Lever
 from ..models.transfer import Transfer
+from ..numeric.arrays import Array, ComplexArray
 
 LONGEST_STEP = 0.05  # [s] that the trim moves on by after a gap
 FREQUENCIES: Array = np.linspace(0.5, 12.0, 116)  # [Hz]

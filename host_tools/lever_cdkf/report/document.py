@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from importlib.resources import files
 from string import Template
 
-from ..extras import require
+from ..runtime.extras import require
 from .figure import Spec
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array
+from ..numeric.arrays import Array
 from .series import packed
 
 Spec = dict[str, Any]

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, BoolArray
 from ..firmware import native, quantities
 from ..firmware.quantities import Quantity
 from ..models.lever import Lever
 from ..models.transfer import Transfer
+from ..numeric.arrays import Array, BoolArray
 from ..results import whiteness
 from ..results.coherence import Coherence
 from ..results.faults import OPTIONAL, warning_bits

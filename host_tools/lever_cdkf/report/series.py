@@ -5,7 +5,7 @@ import base64
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array
+from ..numeric.arrays import Array
 
 
 def packed(values: Array) -> dict[str, object]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..firmware.aircraft import AircraftResponse
 from ..firmware.library import enum_names
+from ..numeric.arrays import FloatArray
 from .summary import Stability
 from .trace import Trace
 

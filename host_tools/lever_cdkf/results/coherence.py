@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
+from ..numeric.arrays import FloatArray
 
 WINDOW = 2.0
 """[s]: half a hertz between frequencies."""

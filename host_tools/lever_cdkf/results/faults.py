@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..firmware.estimator import DO_NOT_TRUST
 from ..firmware.library import enum_names
+from ..numeric.arrays import FloatArray
 
 OPTIONAL = {"theta_dot": "theta_dot", "torque": "tau_m"}
 """Inputs that a recording may lack, by the fault that says so."""

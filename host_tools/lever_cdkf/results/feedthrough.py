@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
 from ..firmware.estimator import FEEDTHROUGH_FREQUENCIES
+from ..numeric.arrays import FloatArray
 
 # column of the trace, its message and field
 FEEDTHROUGH = (

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
-from ..statistics import NORMAL_95, chi_square_quantile
+from ..numeric.arrays import FloatArray
+from ..numeric.quantiles import NORMAL_95, chi_square_quantile
 
 CHI_SQUARE_95 = {freedom: chi_square_quantile(0.95, freedom) for freedom in (1, 2)}
 """Value that chi-square with so many degrees of freedom stays below with a probability of 95 %."""

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import LeverError
-from ..files import json_text
-from ..provenance import Provenance
+from ..runtime.files import json_text
+from ..runtime.provenance import Provenance
 from .nis import Nis
 from .whiteness import Whiteness
 

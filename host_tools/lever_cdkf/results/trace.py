@@ -15,9 +15,9 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
 from ..firmware.library import ffi, load
 from ..firmware.quantities import DYNAMICS, quantities
+from ..numeric.arrays import FloatArray
 
 _lib = load("lever_bulk")
 

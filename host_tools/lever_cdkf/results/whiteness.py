@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..statistics import NORMAL_95, normal_quantile
+from ..numeric.arrays import FloatArray
+from ..numeric.quantiles import NORMAL_95, normal_quantile
 
 AVERAGE = 0.02
 """Time over which the residual is averaged [s]."""

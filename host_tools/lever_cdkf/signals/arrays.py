@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..errors import LeverError
+from ..numeric.arrays import FloatArray
 from .recorded import Signal
 from .tables import Columns, find_time, seconds, time_scale
 from .units import KINDS, normal, split_name

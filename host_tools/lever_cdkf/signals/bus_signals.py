@@ -21,8 +21,8 @@ from e2e.p05 import e2e_p05_check
 from ..can.bulk import ERROR, EXTENDED, FD, REMOTE, Frames
 from ..can.logs import LogError, Recording
 from ..errors import LeverError
-from ..near_names import near_names
 from ..results.summary import MessageCounts
+from ..text.suggestions import nearest_names
 from .mapping import Protection
 from .recorded import Signal
 
@@ -84,7 +84,7 @@ def of_fd(message: Message) -> bool:
 
 
 def _near(name: str, names: Iterable[str]) -> str:
-    near = near_names(name, names)
+    near = nearest_names(name, names)
     return f"; near to it: {', '.join(near)}" if near else ""
 
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
+from ..numeric.arrays import FloatArray, IntArray
 
 _Times = TypeVar("_Times", FloatArray, IntArray)
 _LISTED = 5  # places in a sentence

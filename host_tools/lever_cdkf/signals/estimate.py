@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import LeverError
 from ..firmware.config import Config
 from ..firmware.estimator import run_samples
-from ..slope import in_degrees
+from ..numeric.derivative import in_degrees
 from .arrays import columns_of, signals_by_input
 from .inputs import recorded_samples, understood
 from .mapping import Source

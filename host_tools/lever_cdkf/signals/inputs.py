@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import LeverError
+from ..numeric.derivative import derivative_ratio
 from ..results.summary import MappedSignal
-from ..slope import slope_ratio
-from ..units import GRAVITY
+from ..text.units import GRAVITY
 from .mapping import Source
 from .recorded import Signal
 from .resample import Samples, sample
@@ -141,7 +141,7 @@ def _disagreement(inputs: Mapping[str, Input], samples: Samples) -> list[str]:
     wrong."""
     if not {"theta", "theta_dot"} <= inputs.keys():
         return []
-    ratio = slope_ratio(inputs["theta"].signal, inputs["theta_dot"].signal)
+    ratio = derivative_ratio(inputs["theta"].signal, inputs["theta_dot"].signal)
     names = f"theta_dot = {inputs['theta_dot'].signal.name} and theta = {inputs['theta'].signal.name}"
     if ratio < 0.0:
         return [f"{names}: the rate is minus the slope of the angle: one of them needs sign=-1"]

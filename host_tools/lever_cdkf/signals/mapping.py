@@ -25,9 +25,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import LeverError
-from ..near_names import did_you_mean
-from ..toml_text import TomlError, parse
-from ..units import split
+from ..text.suggestions import did_you_mean
+from ..text.toml_text import TomlError, parse
+from ..text.units import split
 from .units import INPUTS, KINDS, factor
 
 GRAVITY_CHOICES = ("auto", "included", "none")

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..can import codec
-from ..units import GRAVITY
+from ..text.units import GRAVITY
 from .bus_signals import find, load_database, number, of_fd
 from .inputs import Input, samples_of, understood
 from .mapping import Mapping, Source

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
 from ..exports import pictures
-from ..extras import require
-from ..files import whole, write_text
-from ..provenance import Provenance, with_provenance
+from ..numeric.arrays import FloatArray, IntArray
+from ..runtime.extras import require
+from ..runtime.files import whole, write_text
+from ..runtime.provenance import Provenance, with_provenance
 from .recorded import Signal
 
 _BLOCKS = "▁▂▃▄▅▆▇█"

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..errors import LeverError
-from ..slope import STEP, slope_likeness, slope_ratio, together
-from ..units import GRAVITY
+from ..numeric.arrays import FloatArray
+from ..numeric.derivative import STEP, derivative_correlation, derivative_ratio, interval_means
+from ..text.units import GRAVITY
 from .mapping import Mapping, Source
 from .recorded import Signal
 from .units import INPUTS, factor, fitting, is_unit, likely
@@ -128,7 +128,7 @@ def _goes_with(each: Candidate, chosen: dict[str, Candidate]) -> bool:
     """Return whether a rate is the slope of the angle, perhaps with the other sign; another rate is worse than none."""
     if each.key != "theta_dot" or "theta" not in chosen:
         return True
-    return abs(slope_likeness(chosen["theta"].signal, each.signal)) > 0.5
+    return abs(derivative_correlation(chosen["theta"].signal, each.signal)) > 0.5
 
 
 def _is_clear(key: str, best: Sequence[Candidate]) -> bool:
@@ -138,7 +138,7 @@ def _is_clear(key: str, best: Sequence[Candidate]) -> bool:
 
 def _source(each: Candidate, chosen: dict[str, Candidate], unit: str) -> Source:
     turned = each.key == "theta_dot" and "theta" in chosen
-    turned = turned and slope_likeness(chosen["theta"].signal, each.signal) < 0.0
+    turned = turned and derivative_correlation(chosen["theta"].signal, each.signal) < 0.0
     return Source(each.signal.name, unit, sign=-1 if turned else None)
 
 
@@ -153,7 +153,7 @@ def _unit(each: Candidate, chosen: dict[str, Candidate]) -> tuple[str, tuple[str
     if each.key == "theta_dot" and "theta" in chosen:
         angle = chosen["theta"].signal
         scale = factor("theta", angle.unit or likely("theta", angle.values)[0])
-        ratio = abs(slope_ratio(angle, each.signal))
+        ratio = abs(derivative_ratio(angle, each.signal))
         for unit in ("rad/s", "deg/s"):
             one = factor(each.key, unit)
             if scale and one and 0.5 < ratio * one / scale < 2.0:
@@ -247,7 +247,7 @@ def _with_slopes(candidates: list[Candidate]) -> list[Candidate]:
     gains: dict[tuple[str, str], tuple[float, str]] = {}
     for angle in _best(candidates, "theta"):
         for rate in _best(candidates, "theta_dot"):
-            if angle.signal.name != rate.signal.name and slope_likeness(angle.signal, rate.signal) > 0.8:
+            if angle.signal.name != rate.signal.name and derivative_correlation(angle.signal, rate.signal) > 0.8:
                 gains["theta", angle.signal.name] = _IS_SLOPE, f"its slope is {rate.signal.name}"
                 gains["theta_dot", rate.signal.name] = _IS_SLOPE, f"the slope of {angle.signal.name}"
     return _gained(candidates, gains)
@@ -284,7 +284,7 @@ def _gained(candidates: list[Candidate], gains: dict[tuple[str, str], tuple[floa
 
 def _coherence(base: Signal, lever: Signal) -> float:
     """Return mean coherence of two signals from 2 to 8 Hz, less what chance gives."""
-    both = together(base, lever)
+    both = interval_means(base, lever)
     if len(both[0]) < 8 * _SEGMENT or not all(np.isfinite(each).any() for each in both):
         return 0.0
     window = np.hanning(_SEGMENT)

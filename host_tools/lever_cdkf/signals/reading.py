@@ -7,16 +7,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ..can.estimator_frames import LATE
 from ..can.logs import Recording
-from ..can.traffic import LATE
 from ..errors import LeverError
-from ..near_names import near_names
 from ..results.summary import Mapped, MessageCounts
+from ..text.suggestions import nearest_names
 from .bus_signals import BusSignals, find, load_database
 from .clock import RunningClock
 from .inputs import Input, recorded_samples, understood
 from .mapping import Mapping
-from .own import own_mapping
+from .named_columns import mapping_by_name
 from .recorded import Signal, notes_of
 from .resample import Samples
 from .tables import is_table, read_table
@@ -118,7 +118,7 @@ def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, pro
 def _of_table(path: str, reading: Reading) -> Loaded:
     mapping = reading.mapping
     columns = read_table(path, None if mapping is None else mapping.time)
-    mapping = mapping or own_mapping(columns, path)
+    mapping = mapping or mapping_by_name(columns, path)
     start = _beginning(columns) + reading.start
     inputs = {}
     for key, source in mapping.sources.items():
@@ -206,5 +206,5 @@ def column(columns: Sequence[Signal], name: str, where: str) -> Signal:
         if len(matches) == 1:
             return matches[0]
     names = [each.name for each in columns]
-    near = near_names(name, names) or names[:8]
+    near = nearest_names(name, names) or names[:8]
     raise LeverError(f"{where}: no column {name}; there are {', '.join(near)}{' …' if len(names) > len(near) else ''}")

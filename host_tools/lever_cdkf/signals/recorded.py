@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..numeric.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
 from ..errors import LeverError
 from ..firmware.config import Config, setting
+from ..numeric.arrays import FloatArray, IntArray
 from .recorded import Signal, ordered
 
 _ALIKE = 1.33  # periods that differ by less are of one rate

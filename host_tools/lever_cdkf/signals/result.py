@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray, IntArray
 from ..errors import LeverError
-from ..extras import require
-from ..files import whole, write_text
 from ..firmware.config import Config
 from ..firmware.estimator import fault_names
 from ..firmware.library import enum_names
 from ..firmware.quantities import DYNAMICS, parameters
-from ..provenance import provenance
+from ..numeric.arrays import FloatArray, IntArray
+from ..runtime.extras import require
+from ..runtime.files import whole, write_text
+from ..runtime.provenance import provenance
 
 Text = NDArray[np.str_]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arrays import FloatArray
+from ..numeric.arrays import FloatArray
 
 if TYPE_CHECKING:
     from .result import Estimated

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, FloatArray
 from ..errors import LeverError
-from ..extras import require
-from ..unheard import unheard
+from ..numeric.arrays import Array, FloatArray
+from ..runtime.extras import require
+from ..runtime.quiet_asammdf import quiet_asammdf
 from . import text_table
 from .clock import RunningClock
 from .recorded import Signal
@@ -174,7 +174,7 @@ def _opened_mf4(path: str) -> Any:
     require("mf4")
     from asammdf import MDF
 
-    with unheard():
+    with quiet_asammdf():
         try:
             return MDF(path)
         except Exception as error:

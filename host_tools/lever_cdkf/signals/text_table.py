@@ -12,8 +12,8 @@ from itertools import islice
 
 import numpy as np
 
-from ..arrays import Array
 from ..errors import LeverError
+from ..numeric.arrays import Array
 from .units import is_unit, normal, split_name
 
 UTF_8, WESTERN = "utf-8-sig", "cp1252"

@@ -7,9 +7,9 @@ import re
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..errors import LeverError
-from ..units import GRAVITY
+from ..numeric.arrays import FloatArray
+from ..text.units import GRAVITY
 
 KINDS = {
     "time": ("time", "s"),

@@ -22,9 +22,9 @@ import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.signal import butter, sosfilt
 
-from ..arrays import Array
 from ..firmware.config import setting
 from ..firmware.settings_file import Assignments, make_config
+from ..numeric.arrays import Array
 from ..results import whiteness
 from .likelihood import LEARNT_LEAST, Likelihood, noise_as_set
 from .search import NOISE, ShowProgress

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays import Array
 from ..errors import LeverError
 from ..firmware.innovations import innovations
 from ..firmware.settings_file import Assignments, make_config
+from ..numeric.arrays import Array
 from .recording import Recording
 
 START = 10.0

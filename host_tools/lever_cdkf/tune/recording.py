@@ -8,15 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
 from ..can import codec, logs
-from ..can.traffic import Traffic, why_refused
+from ..can.estimator_frames import EstimatorFrames, why_refused
 from ..errors import LeverError
 from ..firmware.config import Config, setting
 from ..firmware.estimator import Health
 from ..firmware.innovations import FRAME, samples_of
+from ..numeric.arrays import Array
+from ..signals.mapped_frames import MappedFrames
 from ..signals.reading import Reading
-from ..signals.traffic import MappedTraffic
 
 _SAMPLES = ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")
 
@@ -67,9 +67,9 @@ def read(
     """Return the samples on the bus `channel` (if not given: the one that has any) from `start` on for `length`,
     both [s] of recorded time; with `reading`, of a log that does not speak lever.dbc. Raise LeverError."""
     if reading is not None:
-        mapped = MappedTraffic(list(map(str, paths)), reading)
+        mapped = MappedFrames(list(map(str, paths)), reading)
         return _recording(np.concatenate(list(mapped.chunks())), str(mapped.channel), ", ".join(mapped.recording.paths))
-    traffic = Traffic(logs.Recording(paths), channel)
+    traffic = EstimatorFrames(logs.Recording(paths), channel)
     log = traffic.recording
     identifiers = np.array([codec.message(name).frame_id for name in _SAMPLES])
     command = codec.message("COMMAND").frame_id

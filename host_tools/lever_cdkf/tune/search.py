@@ -20,7 +20,7 @@ from scipy.optimize import brentq, minimize
 
 from ..firmware.config import model_parameters, setting, single
 from ..firmware.settings_file import Assignments, make_config
-from ..statistics import chi_square_quantile
+from ..numeric.quantiles import chi_square_quantile
 from .likelihood import LEARNT_LEAST, Likelihood, noise_as_set
 
 NOISE = ("theta_noise", "theta_dot_noise", "theta_dot_process_noise")

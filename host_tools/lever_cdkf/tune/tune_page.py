@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..cli.tables import Row
 from ..report.figure import Figure, Spec, axis, band, dots, line
 from ..report.page import Page
 from ..report.summary_html import number, table
 from ..results.whiteness import CANNOT_SEE
-from ..tables import Row
 from .search import Tuned
 from .validation import Fit
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array
 from ..firmware.settings_file import Assignments, make_config
+from ..numeric.arrays import Array
 from ..results import whiteness
 from .likelihood import Likelihood, noise_as_set
 

@@ -9,10 +9,10 @@ from ..can.bulk import Buses, Feeder, Frames
 from ..firmware.aircraft import AircraftResponse
 from ..firmware.config import Config
 from ..firmware.estimator import FRAME_SAMPLE, Estimator
+from ..signals.mapped_frames import MappedFrames
 from ..signals.online import Online
 from ..signals.reading import Reading
 from ..signals.resample import at_period
-from ..signals.traffic import MappedTraffic
 from .sources import BusSource, LogSource
 
 
@@ -22,7 +22,7 @@ class MappedLog:
     def __init__(self, path: str, reading: Reading, config: Config, aircraft: AircraftResponse | None) -> None:
         """Read all of it. Raise LeverError."""
         self.buses = Buses()
-        self._traffic = MappedTraffic([path], reading)
+        self._traffic = MappedFrames([path], reading)
         self._estimator = Estimator(self._traffic.at_its_rate(config))
         self._estimator.watch(aircraft)
         self.damaged, self.ends_early = self._traffic.recording.damaged, self._traffic.recording.ends_early

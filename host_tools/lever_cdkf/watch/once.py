@@ -7,7 +7,7 @@ import time
 from rich.console import Console, Group, RenderableType
 from rich.rule import Rule
 
-from ..layout import UNLIMITED, terminal_width
+from ..cli.layout import UNLIMITED, terminal_width
 from . import panels
 from .picture import STEP, Picture
 from .sources import LogSource, Source

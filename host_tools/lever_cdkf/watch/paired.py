@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import FloatArray
 from ..can import codec, fields
+from ..numeric.arrays import FloatArray
 from ..results.coherence import Coherence
 
 SPAN = 20.0

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..can import codec, fields
 from ..can.identity import Identity
-from ..can.message_counts import Traffic
+from ..can.message_counts import MessageCounter
 from ..firmware.config import model_parameters
 from ..firmware.estimator import FEEDTHROUGH_FREQUENCIES, fault_names
 from ..firmware.library import enum_names
@@ -71,7 +71,7 @@ class Picture:
     """
 
     def __init__(self) -> None:
-        self.traffic = {entry.name: Traffic(entry.name) for entry in codec.database().messages}
+        self.traffic = {entry.name: MessageCounter(entry.name) for entry in codec.database().messages}
         self._by_identifier = {entry.identifier: entry for entry in self.traffic.values()}
         self.clear_counts()
         self.now = 0.0

@@ -26,9 +26,9 @@ from .picture import ERROR, FOREIGN, STEP, Frame, Picture
 if TYPE_CHECKING:
     import can
 
-    from ..arrays import ComplexArray, FloatArray
     from ..can.bulk import Buses, Frames
     from ..firmware.config import Config
+    from ..numeric.arrays import ComplexArray, FloatArray
 
 MOST_WAITING = 65536
 """Frames: eight seconds of a full bus of 1 Mbit/s."""

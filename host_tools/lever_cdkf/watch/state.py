@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import ComplexArray, FloatArray
 from ..can.fields import COUNTS
 from ..firmware import quantities
 from ..firmware.config import Config, setting
 from ..firmware.library import enum_names
+from ..numeric.arrays import ComplexArray, FloatArray
 from ..report import bode
 from . import paired, status
 from .picture import STEP, Picture

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import FloatArray
 from ..firmware.config import Config
 from ..firmware.estimator import FEEDTHROUGH_FREQUENCIES
 from ..models.lever import Lever
+from ..numeric.arrays import FloatArray
 from ..report import bode
 from .picture import Feedthrough
 

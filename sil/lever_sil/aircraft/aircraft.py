@@ -34,8 +34,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import ComplexArray
 from lever_cdkf.errors import LeverError
+from lever_cdkf.numeric.arrays import ComplexArray
 
 from ..toml_tables import (
     Place,

@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.aircraft import ALARM, WARNING, AircraftResponse, SeatTransfer
+from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
 
 from .aircraft import Coupled
 from .stability import Response

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.models.transfer import Transfer
+from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
 
 from .aircraft import Aircraft
 

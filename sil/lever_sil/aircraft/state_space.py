@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.files import whole, write_text
-from lever_cdkf.units import number_of
+from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
+from lever_cdkf.runtime.extras import require
+from lever_cdkf.runtime.files import whole, write_text
+from lever_cdkf.text.units import number_of
 
 PITCH, GUST = range(2)
 """Inputs: collective pitch of the blades [rad], vertical force of a gust over the mass [m/s^2]."""

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.errors import LeverError
-from lever_cdkf.units import number_of
+from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
+from lever_cdkf.text.units import number_of
 
 from .state_space import StateSpace, is_state_space
 from .vector_fitting import fit

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import ComplexArray, FloatArray
+from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
 
 from .state_space import StateSpace
 

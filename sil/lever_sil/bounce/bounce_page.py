@@ -9,15 +9,15 @@ from lever_cdkf.firmware.aircraft import ALARM, WARNING
 from lever_cdkf.report.figure import Figure, axis, band, line, time_axis
 from lever_cdkf.report.page import Page
 
-from ..judged import judged_page
-from .campaign import Result
+from ..acceptance import acceptance_page
 from .flights import AIRCRAFT, FIVE
 from .measure import Excerpt
+from .run_conditions import BounceResult
 
 _MOST = 15.0  # [dB]
 
 
-def build(results: Sequence[Result], seeds: int) -> str:
+def build(results: Sequence[BounceResult], seeds: int) -> str:
     """Return the whole page."""
     page = Page(
         "Collective bounce: seen coming, and how far it is held off",
@@ -32,7 +32,7 @@ def build(results: Sequence[Result], seeds: int) -> str:
         None if result.excerpt is None else _chart(result.excerpt, str(result.worst_run(result.condition.figures[0])))
         for result in results
     ]
-    return judged_page.build(page, results, charts, "Gearing is collective pitch over the lever's angle.")
+    return acceptance_page.build(page, results, charts, "Gearing is collective pitch over the lever's angle.")
 
 
 def _chart(shown: Excerpt, flight: str) -> Figure:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial, reduce
 from typing import Any
 
-from ..judged.result import Limit
+from ..acceptance.result import Limit
 from . import measure, pilots
 from .flights import AIRCRAFT, FIVE, Plan
 from .measure import FAULT, Measured

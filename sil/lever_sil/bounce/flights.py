@@ -10,15 +10,15 @@ from itertools import accumulate
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.firmware.aircraft import AircraftResponse
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.numeric.arrays import FloatArray
+from lever_cdkf.text.units import GRAVITY
 from numpy.typing import NDArray
 
 from ..aircraft.aircraft import Aircraft
 from ..aircraft.response_table import UNSURE, known_response
 from ..aircraft.stability import critical_gearing
-from ..envelope.motions import stream
+from ..batch.motions import stream
 from ..fast.closed_loop import Loop
 from ..plants.truth import Truth
 from ..scenarios import inputs as scenario_inputs

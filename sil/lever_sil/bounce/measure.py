@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.library import lib
+from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 
+from ..acceptance.result import Figure, largest, least, mean
 from ..aircraft.stability import critical_gearing
 from ..fast import plants
-from ..judged.result import Figure, largest, least, mean
 from ..plants.truth import Conditions
 from . import detectors, pilots
 from .detectors import Watched

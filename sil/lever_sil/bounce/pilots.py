@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..envelope.motions import arms
+from ..batch.motions import arms
 
 Table = dict[str, Any]
 

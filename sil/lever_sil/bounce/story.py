@@ -8,7 +8,7 @@ import numpy as np
 from lever_cdkf.firmware.library import lib
 from lever_cdkf.report.figure import Figure, Spec, axis, band, hover, line, time_axis
 from lever_cdkf.report.page import Story
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.text.units import GRAVITY
 
 from . import pilots
 from .conditions import BOTH

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.quantities import DYNAMICS, parameters
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from ..study.figures.maps import Scale

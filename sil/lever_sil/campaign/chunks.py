@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lever_cdkf.errors import LeverError
-from lever_cdkf.files import native_file, shared_library, whole
+from lever_cdkf.runtime.files import native_file, shared_library, whole
 
 from . import figures
 from .entrants import ENTRANTS

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.native import DO_NOT_TRUST, Config, run_samples
+from lever_cdkf.numeric.arrays import Array
 
 from ..scenarios.scenario import Scenario
 from ..study.baselines import BASELINES

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.quantities import parameters, quantities
+from lever_cdkf.numeric.arrays import Array
 
 from ..run.summary import times_to
 from ..study.data import PARAMETERS

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import Array, BoolArray
 from lever_cdkf.firmware import quantities
+from lever_cdkf.numeric.arrays import Array, BoolArray
 from numpy.typing import NDArray
 
 from ..fast.closed_loop import Loop, available

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 
 from ..study.figures.maps import Chart, Line, MapFigure
 from . import cells as statistics

@@ -5,9 +5,9 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 
+from lever_cdkf.cli.tables import Row
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table
-from lever_cdkf.tables import Row
 
 from ..study.figures import maps as drawn
 from ..study.figures.maps import MapFigure

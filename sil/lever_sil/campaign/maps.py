@@ -8,10 +8,10 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from lever_cdkf.cli.tables import Row
 from lever_cdkf.errors import LeverError
-from lever_cdkf.files import write_text
-from lever_cdkf.provenance import Provenance, with_provenance
-from lever_cdkf.tables import Row
+from lever_cdkf.runtime.files import write_text
+from lever_cdkf.runtime.provenance import Provenance, with_provenance
 
 from ..study.figures import printed
 from ..study.figures.maps import MapFigure

@@ -20,8 +20,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lever_cdkf import interrupts
 from lever_cdkf.errors import LeverError
+from lever_cdkf.runtime import interrupts
 
 from .chunks import Chunk, Plan, fingerprint, make
 
@@ -40,7 +40,7 @@ _KEPT_MEMORY = str(1 << 28)
 """[bytes] up to which a worker's arrays come from memory that it has already. Dask has it given back after each of
 them, and getting it again takes a quarter of a run's time."""
 _ENVIRONMENT = {"MALLOC_TRIM_THRESHOLD_": _KEPT_MEMORY, "MALLOC_MMAP_THRESHOLD_": _KEPT_MEMORY}
-_BEGIN = "from lever_cdkf import extras; extras.hide_mf4(())"
+_BEGIN = "from lever_cdkf.runtime import extras; extras.hide_mf4(())"
 """What a worker runs first: it reads no logs."""
 _GONE = "the scheduler is gone; what is finished is kept: repeat the command with --resume when there is one again"
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lever_cdkf.files import write_text
+from lever_cdkf.runtime.files import write_text
 
 from ..run.summary import judged_samples
 from ..scenarios import scenario as scenarios

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from lever_cdkf.cli.tables import Cell, Row
 from lever_cdkf.firmware.quantities import quantities
-from lever_cdkf.tables import Cell, Row
 
 from .chunks import Plan
 from .session import Session

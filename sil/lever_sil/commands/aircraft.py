@@ -67,10 +67,10 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    from lever_cdkf.cli.tables import print_tables
     from lever_cdkf.errors import LeverError
-    from lever_cdkf.files import write_text
-    from lever_cdkf.provenance import provenance
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.runtime.files import write_text
+    from lever_cdkf.runtime.provenance import provenance
 
     from ..aircraft import aircraft
     from ..aircraft.tabulated import is_response
@@ -194,8 +194,8 @@ def _assignments(changes: list[str]) -> dict[str, str]:
 
 def _quantity(key: str, written: str, unit: str) -> float:
     """Return a number in `unit`, or with one of its units. Raise LeverError."""
-    from lever_cdkf import units
     from lever_cdkf.errors import LeverError
+    from lever_cdkf.text import units
 
     try:
         return units.parse(written if math.isnan(units.number_of(written)) else f"{written} {unit}", unit)

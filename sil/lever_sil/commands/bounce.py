@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .judged import JudgedCommand, Show
+from .acceptance import AcceptanceCommand, Show
 
 if TYPE_CHECKING:
-    from ..bounce.campaign import Result
+    from ..acceptance.result import Figure
     from ..bounce.conditions import Condition
-    from ..judged.result import Figure
+    from ..bounce.run_conditions import BounceResult
 
 _DESCRIPTION = """\
 Flies three helicopters in gusts, each with random pilots whose arm may close the loop of collective bounce through
@@ -34,7 +34,7 @@ examples:
 """
 
 
-class _Bounce(JudgedCommand["Condition"]):
+class _Bounce(AcceptanceCommand["Condition"]):
     name = "bounce"
     about = "test alarm and mitigation of collective bounce in flights"
     description, epilog = _DESCRIPTION, _EPILOG
@@ -50,10 +50,10 @@ class _Bounce(JudgedCommand["Condition"]):
 
         return FIGURES
 
-    def measure(self, chosen: Sequence[Condition], seeds: int, show: Show) -> Sequence[Result]:
-        from ..bounce import campaign
+    def measure(self, chosen: Sequence[Condition], seeds: int, show: Show) -> Sequence[BounceResult]:
+        from ..bounce import run_conditions
 
-        return campaign.run(chosen, seeds, show)
+        return run_conditions.run(chosen, seeds, show)
 
     def page(self, results: Sequence[Any], seeds: int) -> str:
         from ..bounce import bounce_page

@@ -11,10 +11,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.cli.layout import command_lines, say, terminal_width
+from lever_cdkf.cli.tables import add_json_option
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.layout import command_lines, say, terminal_width
-from lever_cdkf.tables import add_json_option
+from lever_cdkf.runtime.extras import require
 
 if TYPE_CHECKING:
     from ..campaign.chunks import Plan
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.list:
         require("campaign")
 
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
 
     from ..campaign import spec
     from ..campaign.chunks import Plan
@@ -103,8 +103,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _run(plan: Plan, folder: Path, args: argparse.Namespace) -> Session:
-    from lever_cdkf.files import make_folder
-    from lever_cdkf.progress import Progress
+    from lever_cdkf.cli.progress import Progress
+    from lever_cdkf.runtime.files import make_folder
 
     from ..campaign import spec
     from ..campaign.session import Session, connected, dashboard, run
@@ -124,9 +124,9 @@ def _run(plan: Plan, folder: Path, args: argparse.Namespace) -> Session:
 
 def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace) -> int:
     """Return files of what is done, and what is printed of it."""
-    from lever_cdkf.files import write_text
-    from lever_cdkf.provenance import provenance
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
+    from lever_cdkf.runtime.files import write_text
+    from lever_cdkf.runtime.provenance import provenance
 
     from ..campaign import maps, summary
 
@@ -166,7 +166,7 @@ def _count(number: int, what: str) -> str:
 
 def _one(chosen: Spec, args: argparse.Namespace) -> int:
     """Return a run alone."""
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
 
     from ..campaign import design
     from ..campaign.entrants import FIRMWARE

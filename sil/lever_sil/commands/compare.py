@@ -7,12 +7,12 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.progress import Progress
+from lever_cdkf.cli.tables import Row, add_json_option
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.files import make_folder
-from lever_cdkf.layout import say
-from lever_cdkf.progress import Progress
-from lever_cdkf.tables import Row, add_json_option
+from lever_cdkf.runtime.extras import require
+from lever_cdkf.runtime.files import make_folder
 
 from .names import check_names
 
@@ -106,7 +106,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """`lever compare`."""
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
 
     if args.list and not args.envelope:
         print_tables(_listed(), args.json)
@@ -126,20 +126,20 @@ def run(args: argparse.Namespace) -> int:
 
 def _compare(args: argparse.Namespace) -> int:
     """Run all estimators that take part on all cases that were asked for."""
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
 
-    from ..study.compare import campaign, entrants, evaluation, table, verdicts
+    from ..study.compare import entrants, evaluation, run_cases, table, verdicts
 
     if args.score is not None:
         entrants.enter(args.score)
     plan, names = _drawn(args) if args.data is None else _of_files(args)
-    todo = campaign.tasks(names, _estimators(args), plan)
+    todo = run_cases.tasks(names, _estimators(args), plan)
     if not todo:
         raise LeverError("none of these estimators takes part in any of these cases; see `lever compare --list`")
     if args.out is not None:
         make_folder(args.out)  # before a campaign that could then not be kept
     with Progress("compare") as progress:
-        results = campaign.run(todo, args.jobs, progress.show)
+        results = run_cases.run(todo, args.jobs, progress.show)
     rows = evaluation.judge(results)
     claims = verdicts.claims(rows) if results.plan.is_whole else []
     by_case = verdicts.verdicts(rows, *evaluation.compare(results, rows))
@@ -148,8 +148,8 @@ def _compare(args: argparse.Namespace) -> int:
     for case, verdict in by_case.items():
         say(f"{case}: {verdict}")
     if args.out is not None:
-        from lever_cdkf.files import Outputs, write_text, writing
-        from lever_cdkf.provenance import provenance, with_provenance
+        from lever_cdkf.runtime.files import Outputs, write_text, writing
+        from lever_cdkf.runtime.provenance import provenance, with_provenance
 
         from ..study.compare import compare_page, printed
 
@@ -183,9 +183,9 @@ def _drawn(args: argparse.Namespace) -> tuple[Plan, list[str]]:
 
 def _paper(args: argparse.Namespace) -> int:
     """Run `lever compare --paper`."""
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
 
-    from ..study.compare import campaign, paper
+    from ..study.compare import paper, run_cases
     from ..study.compare.cases import Plan
 
     for option in ("scenarios", "models", "out", "quick", "score", "data"):
@@ -194,9 +194,9 @@ def _paper(args: argparse.Namespace) -> int:
     seeds = paper.SEEDS if args.seeds is None else args.seeds
     _check(seeds, args.duration, args.jobs)
     plan = Plan(seeds, args.duration, _SEED if args.seed is None else args.seed)
-    todo = campaign.tasks(paper.names(), args.estimators and _estimators(args), plan)
+    todo = run_cases.tasks(paper.names(), args.estimators and _estimators(args), plan)
     with Progress("compare") as progress:
-        results = campaign.run(todo, args.jobs, progress.show)
+        results = run_cases.run(todo, args.jobs, progress.show)
     print_tables(paper.tables(results), args.json)
     return 0
 

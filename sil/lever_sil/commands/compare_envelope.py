@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import argparse
 
+from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.progress import Progress
+from lever_cdkf.cli.tables import Row, print_tables, write_json
 from lever_cdkf.errors import LeverError
-from lever_cdkf.layout import say
-from lever_cdkf.progress import Progress
-from lever_cdkf.tables import Row, print_tables, write_json
 
 from ..envelope import conditions
-from ..study.peers import campaign, tables
-from ..study.peers.filters import PEERS
+from ..study.compare_envelope import run_estimators, tables
+from ..study.compare_envelope.filters import JOINT_FILTERS
 from .names import check_names
 
 SEEDS = 8
@@ -19,7 +19,7 @@ _NOT_HERE = ("models", "duration", "seed", "out", "score", "data")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Return the firmware and its peers in the conditions of `lever envelope`."""
+    """Return the firmware and joint EKF and UKF in the conditions of `lever envelope`."""
     if args.list:
         print_tables(_listed(), args.json)
         return 0
@@ -27,16 +27,16 @@ def run(args: argparse.Namespace) -> int:
         if getattr(args, name) is not None:
             raise LeverError(f"--{name} does not go with --envelope")
     check_names("condition", args.scenarios or (), conditions.CONDITIONS, "lever compare --envelope --list")
-    check_names("estimator", args.estimators or (), campaign.ESTIMATORS, "lever compare --envelope --list")
+    check_names("estimator", args.estimators or (), run_estimators.ESTIMATORS, "lever compare --envelope --list")
     wanted = args.scenarios or [name for name, one in conditions.CONDITIONS.items() if one.quick or not args.quick]
     seeds = args.seeds if args.seeds is not None else SEEDS
-    todo = campaign.tasks(
+    todo = run_estimators.tasks(
         [one for name, one in conditions.CONDITIONS.items() if name in wanted],
         seeds,
-        args.estimators or campaign.ESTIMATORS,
+        args.estimators or run_estimators.ESTIMATORS,
     )
     with Progress("compare") as progress:
-        results = campaign.run(todo, args.jobs, progress.show)
+        results = run_estimators.run(todo, args.jobs, progress.show)
     print_tables(tables.tables(results, seeds))
     for sentence in tables.verdicts(results):
         say(sentence)
@@ -47,8 +47,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _listed() -> dict[str, list[Row]]:
-    titles = {campaign.FIRMWARE: "as shipped, with the settings of the condition"}
-    titles |= {name: peer.title for name, peer in PEERS.items()}
+    titles = {run_estimators.FIRMWARE: "as shipped, with the settings of the condition"}
+    titles |= {name: each.title for name, each in JOINT_FILTERS.items()}
     return {
         "conditions": [{"name": name, "title": one.title} for name, one in conditions.CONDITIONS.items()],
         "estimators": [{"name": name, "title": title} for name, title in titles.items()],

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from .judged import JudgedCommand, Show
+from .acceptance import AcceptanceCommand, Show
 
 if TYPE_CHECKING:
-    from ..envelope.campaign import Result
+    from ..acceptance.result import Figure
     from ..envelope.condition import Condition
-    from ..judged.result import Figure
+    from ..envelope.run_conditions import EnvelopeResult
 
 _DESCRIPTION = """\
 Runs the firmware in the conditions that a collective meets: a pilot who moves the lever, lets go or tightens the grip,
@@ -39,7 +39,7 @@ examples:
 """
 
 
-class _Envelope(JudgedCommand["Condition"]):
+class _Envelope(AcceptanceCommand["Condition"]):
     name = "envelope"
     about = "test the firmware in the conditions of a real collective"
     description, epilog = _DESCRIPTION, _EPILOG
@@ -60,10 +60,10 @@ class _Envelope(JudgedCommand["Condition"]):
 
         return FIGURES
 
-    def measure(self, chosen: Sequence[Condition], seeds: int, show: Show) -> Sequence[Result]:
-        from ..envelope import campaign
+    def measure(self, chosen: Sequence[Condition], seeds: int, show: Show) -> Sequence[EnvelopeResult]:
+        from ..envelope import run_conditions
 
-        return campaign.run(chosen, self.conditions(), seeds, show)
+        return run_conditions.run(chosen, self.conditions(), seeds, show)
 
     def page(self, results: Sequence[Any], seeds: int) -> str:
         from ..envelope import envelope_page

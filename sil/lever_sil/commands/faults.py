@@ -7,16 +7,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.files import json_text, make_folder, write_texts
-from lever_cdkf.layout import say
-from lever_cdkf.progress import Progress
+from lever_cdkf.runtime.extras import require
+from lever_cdkf.runtime.files import json_text, make_folder, write_texts
 
 from .names import check_names
 
 if TYPE_CHECKING:
-    from ..faults.matrix import Result
+    from ..faults.matrix import RowResult
     from ..faults.rows import Row
 
 _DESCRIPTION = """\
@@ -69,13 +69,15 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """`lever faults`."""
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
 
     from ..faults import matrix, table
     from ..faults.rows import ROWS
 
     if args.list:
-        listed = [{"fault": row.name, "title": row.title, "must": table.demands(row.must)} for row in ROWS.values()]
+        listed = [
+            {"fault": row.name, "title": row.title, "must": table.demands(row.requirement)} for row in ROWS.values()
+        ]
         print_tables({"faults": listed}, args.json)
         return 0
     require("report")
@@ -95,11 +97,11 @@ def run(args: argparse.Namespace) -> int:
     return 1 if unexpected else 0
 
 
-def _write(args: argparse.Namespace, results: Sequence[Result], seeds: int) -> None:
+def _write(args: argparse.Namespace, results: Sequence[RowResult], seeds: int) -> None:
     """Write the files that were asked for."""
     from dataclasses import asdict
 
-    from lever_cdkf.provenance import provenance, with_provenance
+    from lever_cdkf.runtime.provenance import provenance, with_provenance
 
     from ..faults import faults_page, table
 

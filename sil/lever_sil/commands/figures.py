@@ -7,8 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lever_cdkf.extras import require
-from lever_cdkf.layout import say
+from lever_cdkf.cli.layout import say
+from lever_cdkf.runtime.extras import require
 
 _PAGE, _CAPTIONS, _PROVENANCE = "figures.html", "captions.md", "provenance.json"
 
@@ -117,7 +117,7 @@ def _as_drawn(figure: MapFigure, _seed: int, _extent: Extent) -> MapFigure:
 
 
 def _list() -> int:
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
 
     from ..study.figures.catalogue import FIGURES, summary
     from ..study.figures.paper import PAPER
@@ -130,10 +130,10 @@ def _list() -> int:
 
 def _make(makers: Mapping[str, Make], args: argparse.Namespace) -> list[str]:
     """Make the figures and write the files, all or none; return their names. Raise LeverError."""
+    from lever_cdkf.cli.progress import Progress
     from lever_cdkf.exports import pictures
-    from lever_cdkf.files import Outputs, writing
-    from lever_cdkf.progress import Progress
-    from lever_cdkf.provenance import provenance, with_provenance
+    from lever_cdkf.runtime.files import Outputs, writing
+    from lever_cdkf.runtime.provenance import provenance, with_provenance
 
     from ..study.figures import data, figures_page, printed
     from ..study.figures.runs import Extent

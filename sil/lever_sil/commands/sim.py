@@ -12,17 +12,17 @@ from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.can import buses
 from lever_cdkf.can.buses import add_bus_options, chosen_options
+from lever_cdkf.cli.formats import FORMATS, add_format_option, chosen_formats
+from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.tables import Row, Tables, add_json_option
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.formats import FORMATS, add_format_option, chosen_formats
-from lever_cdkf.layout import say
-from lever_cdkf.tables import Row, Tables, add_json_option
+from lever_cdkf.runtime.extras import require
 
 if TYPE_CHECKING:
     import can
     from lever_cdkf.report.page import Story
 
-    from ..run.runner import Result
+    from ..run.runner import SimulationResult
     from ..scenarios.scenario import Scenario
 
 _DESCRIPTION = """\
@@ -158,8 +158,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _simulate_seeds(args: argparse.Namespace, overrides: Sequence[str]) -> int:
     """`lever sim --seeds`."""
-    from lever_cdkf.progress import Progress
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.progress import Progress
+    from lever_cdkf.cli.tables import print_tables
 
     from ..run import seeds
     from ..scenarios.scenario import load
@@ -216,7 +216,7 @@ def run_demo(args: argparse.Namespace) -> int:
 
 
 def _list(json_file: str | None) -> int:
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
 
     from ..scenarios.scenario import load, names
 
@@ -236,8 +236,8 @@ def _simulate(
     args: argparse.Namespace,
     story: Callable[[], Story] | None = None,
 ) -> int:
-    from lever_cdkf.progress import Progress
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.progress import Progress
+    from lever_cdkf.cli.tables import print_tables
 
     from ..run.runner import simulate
 
@@ -285,7 +285,7 @@ def open_bus(
     return buses.open_bus(interface, channel, bus_options or {})
 
 
-def _tables(result: Result) -> Tables:
+def _tables(result: SimulationResult) -> Tables:
     """Return what is printed at the end."""
     from lever_cdkf.firmware.quantities import quantities
 
@@ -330,7 +330,7 @@ def _times(times: Sequence[float | None]) -> str:
     return ", ".join("-" if seconds is None else f"{seconds:.1f}" for seconds in times)
 
 
-def _reason(result: Result) -> str:
+def _reason(result: SimulationResult) -> str:
     """Return why a run did not pass, in a line."""
     summary = result.summary
     reasons = [f"{summary.unanswered} samples without an answer"] if summary.unanswered else []

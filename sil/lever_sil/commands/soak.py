@@ -8,14 +8,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.files import check_writable, json_text, write_texts
-from lever_cdkf.layout import say
-from lever_cdkf.progress import Progress
+from lever_cdkf.runtime.extras import require
+from lever_cdkf.runtime.files import check_writable, json_text, write_texts
 
 if TYPE_CHECKING:
-    from ..soak.soak import Result
+    from ..soak.soak import SoakResult
 
 _DESCRIPTION = """\
 Flies one instance of the firmware for hours, without a reset: flights of five minutes one after another, each with a
@@ -53,8 +53,8 @@ def run(args: argparse.Namespace) -> int:
     """`lever soak`."""
     from dataclasses import asdict
 
-    from lever_cdkf.provenance import provenance, with_provenance
-    from lever_cdkf.tables import print_tables
+    from lever_cdkf.cli.tables import print_tables
+    from lever_cdkf.runtime.provenance import provenance, with_provenance
 
     from ..soak import soak, soak_page
 
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if troubles else 0
 
 
-def _verdict(result: Result) -> str:
+def _verdict(result: SoakResult) -> str:
     total, faults = result.total, sum(result.faults.values())
     return (
         f"{total.seconds / 3600.0:.2f} h flown with {faults} faults: NEES {total.row()['NEES [1]']:.2f} (expected 1), "

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ..judged.result import Limit
-from .motions import PERIOD, Motion
-from .sensors import Sensors
+from ..acceptance.result import Limit
+from ..batch.firmware import ClosedLoop
+from ..batch.motions import Motion
+from ..batch.sensors import Sensors
 
 Interval = tuple[float, float]
 
@@ -15,19 +16,6 @@ FOLLOWED = 8.0
 """Unless a condition says otherwise [s]."""
 REPORTED = ("f_n rms", "f_n covered", "zeta rms", "zeta covered", "flagged")
 """Figures of every condition whose pilot has a natural frequency."""
-
-
-@dataclass(frozen=True)
-class ClosedLoop:
-    """The firmware makes the dither itself, and a share of its samples is lost."""
-
-    dither: float = 0.3
-    """rms [N m]"""
-    lost: float = 0.5
-    lost_for: float = PERIOD
-    """At a time [s]."""
-    whole: bool = False
-    """The whole sample, not LEVER_SAMPLE alone."""
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..judged.result import Limit
-from .condition import ClosedLoop, Condition
-from .motions import EVENT, Motion
-from .sensors import Fault, Sensors
+from ..acceptance.result import Limit
+from ..batch.firmware import ClosedLoop
+from ..batch.motions import EVENT, Motion
+from ..batch.sensors import Fault, Sensors
+from .condition import Condition
 
 _PARAMETERS = ("m_p", "c_p", "k_p")
 

@@ -9,12 +9,12 @@ from lever_cdkf.firmware.estimator import DO_NOT_TRUST, fault_names
 from lever_cdkf.report.figure import Figure, axis, band, dots, line, time_axis
 from lever_cdkf.report.page import Page
 
-from ..judged import judged_page
-from .campaign import Result
+from ..acceptance import acceptance_page
 from .measure import Excerpt
+from .run_conditions import EnvelopeResult
 
 
-def build(results: Sequence[Result], seeds: int) -> str:
+def build(results: Sequence[EnvelopeResult], seeds: int) -> str:
     """Return the whole page."""
     page = Page(
         "The conditions that a collective meets",
@@ -24,10 +24,10 @@ def build(results: Sequence[Result], seeds: int) -> str:
         "lever envelope",
     )
     charts = [None if result.excerpt is None else _chart(result.excerpt, result) for result in results]
-    return judged_page.build(page, results, charts, f"Flagged is any of {', '.join(fault_names(DO_NOT_TRUST))}.")
+    return acceptance_page.build(page, results, charts, f"Flagged is any of {', '.join(fault_names(DO_NOT_TRUST))}.")
 
 
-def _chart(shown: Excerpt, result: Result) -> Figure:
+def _chart(shown: Excerpt, result: EnvelopeResult) -> Figure:
     """Return natural frequency over time; dots at the foot where the firmware says: do not trust this."""
     low, high = shown.value - 2.0 * shown.sigma, shown.value + 2.0 * shown.sigma
     values = np.concatenate((shown.truth[shown.truth > 2.0], shown.value))

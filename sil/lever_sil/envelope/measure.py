@@ -9,17 +9,17 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST
 from lever_cdkf.firmware.library import lib
+from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from lever_cdkf.report.series import runs
 from numpy.typing import NDArray
 
-from ..judged import result as judged
-from ..judged.result import Values, largest, mean
+from ..acceptance import result as acceptance
+from ..acceptance.result import Values, largest, mean
+from ..batch.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
+from ..batch.motions import Recording
 from .condition import FOLLOWED
-from .firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
-from .motions import Recording
 
 QUANTITIES = ("f_n", "zeta", *PARAMETERS)
 WRONG = 3.0
@@ -248,7 +248,7 @@ def _pooled_rms(values: Values) -> float:
 
 
 @dataclass(frozen=True)
-class Figure(judged.Figure):
+class Figure(acceptance.Figure):
     """One way to measure an outcome."""
 
     compute: Callable[[Outcome], Values] = field(kw_only=True)

@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from ..judged.result import Limit
-from .condition import ClosedLoop, Condition
+from ..acceptance.result import Limit
+from ..batch.firmware import ClosedLoop
+from ..batch.motions import EVENT, Motion
+from ..batch.sensors import Fault, Sensors
+from .condition import Condition
 from .conditions import QUIET, least, most, right
-from .motions import EVENT, Motion
-from .sensors import Fault, Sensors
 
 _G = 9.80665  # [m/s^2]
 _LONG = Motion(duration=140.0)  # 40 seeds, two runs each, from 20 s on: 2.7 h

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 
 from ..aircraft.flight import Flight
 from .library import Struct

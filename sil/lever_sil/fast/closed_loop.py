@@ -8,7 +8,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.can import codec
 from lever_cdkf.can.commander import Commander
 from lever_cdkf.errors import LeverError
@@ -16,6 +15,7 @@ from lever_cdkf.firmware import quantities
 from lever_cdkf.firmware.aircraft import AircraftResponse
 from lever_cdkf.firmware.estimator import Estimator, Recorder, make_command
 from lever_cdkf.firmware.library import ffi, struct_dtype
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from ..aircraft.flight import Flight
@@ -74,7 +74,7 @@ def run(scenario: Scenario, through_frames: bool = False, stride: float = STRIDE
 
 
 @dataclass(frozen=True)
-class Traffic:
+class BusFrames:
     """Frames of 8 bytes in the order in which they were on the bus; arrays of equal length."""
 
     identifier: NDArray[np.uint16] = field(default_factory=lambda: np.empty(0, np.uint16))
@@ -187,9 +187,9 @@ class Loop:
         return lib.loop_advance(self.struct.pointer, self._estimator.pointer, until)  # type: ignore[no-any-return]
 
     def keep_frames(self) -> None:
-        """Have advance() stop where it has filled a Traffic with frames."""
+        """Have advance() stop where it has filled BusFrames."""
         loop, room = self.struct.pointer, _FRAMES_AT_ONCE
-        self._traffic = Traffic(np.empty(room, np.uint16), np.empty(room, np.uint32), np.empty((room, 8), np.uint8))
+        self._traffic = BusFrames(np.empty(room, np.uint16), np.empty(room, np.uint32), np.empty((room, 8), np.uint8))
         loop.frame_room = room
         loop.frame_id = self.struct.array("uint16_t", self._traffic.identifier, np.uint16)
         loop.frame_sample = self.struct.array("uint32_t", self._traffic.sample, np.uint32)
@@ -200,12 +200,12 @@ class Loop:
         recorder = Recorder(self._estimator, period)
         self.struct.pointer.recorder = self.struct.keep(recorder.pointer)
 
-    def take_frames(self) -> Traffic:
+    def take_frames(self) -> BusFrames:
         """Return those since they were taken last."""
         loop, traffic = self.struct.pointer, self._traffic
         taken = slice(0, loop.frames)
         loop.frames = 0
-        return Traffic(traffic.identifier[taken].copy(), traffic.sample[taken].copy(), traffic.data[taken].copy())
+        return BusFrames(traffic.identifier[taken].copy(), traffic.sample[taken].copy(), traffic.data[taken].copy())
 
     def check(self) -> None:
         """Raise LeverError when the firmware has refused a command."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 
 from ..plants import hysteretic_plant, lever_plant, linear_plant, mayo_plant, reflex_plant, two_dof_plant
 from ..plants.truth import Conditions, Truth

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 from e2e.p02 import e2e_p02_protect
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.can import codec
 from lever_cdkf.can.commander import KEEP
 from lever_cdkf.firmware.library import struct_dtype
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from ..fast.library import lib

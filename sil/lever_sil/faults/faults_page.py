@@ -12,7 +12,7 @@ from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table
 
 from .judge import BACK, ERROR, RIGHT, SIGMAS, SILENT, Excerpt
-from .matrix import Result
+from .matrix import RowResult
 from .rows import KNOWN
 from .table import HOLDS, demands, lines, missed, state
 
@@ -28,7 +28,7 @@ _NAMES = {"f_n": "natural frequency [Hz]", "zeta": "damping ratio", "m_p": "m_p 
           "k_p": "k_p [N/m]"}  # fmt: skip
 
 
-def build(results: Sequence[Result], seeds: int) -> str:
+def build(results: Sequence[RowResult], seeds: int) -> str:
     """Return the whole page."""
     page = Page(
         "Faults of bus, senders and sensors",
@@ -43,7 +43,7 @@ def build(results: Sequence[Result], seeds: int) -> str:
     return page.html(_verdict(results), _STYLE)
 
 
-def _verdict(results: Sequence[Result]) -> str:
+def _verdict(results: Sequence[RowResult]) -> str:
     broken = [result.row.name for result in results if result.broken]
     links = ", ".join(f'<a href="#{name}">{name}</a>' for name in broken)
     silent = sum(result.silent for result in results)
@@ -53,7 +53,7 @@ def _verdict(results: Sequence[Result]) -> str:
     return f'<p class="verdict {"bad" if broken else "good"}">{met}; {wrong}.{named}</p>'
 
 
-def _table(results: Sequence[Result]) -> str:
+def _table(results: Sequence[RowResult]) -> str:
     header = (
         "fault",
         "",
@@ -68,7 +68,7 @@ def _table(results: Sequence[Result]) -> str:
     return table(header, (_cells(result) for result in results))
 
 
-def _cells(result: Result) -> list[str]:
+def _cells(result: RowResult) -> list[str]:
     (row,) = lines([result])
     word = state(result)
     name = html.escape(result.row.name)
@@ -76,10 +76,10 @@ def _cells(result: Result) -> list[str]:
         name, word = f'<a href="#{name}">{name}</a>', f'<strong class="missed">{word}</strong>: {missed(result)}'
     figures = ("to flag", "back [s]", "error after [%]", "silent [s]", "right [%]")
     shown = ["never" if row[column] is None else str(row[column]) for column in figures]
-    return [name, html.escape(result.row.title), html.escape(demands(result.row.must)), word, *shown]
+    return [name, html.escape(result.row.title), html.escape(demands(result.row.requirement)), word, *shown]
 
 
-def _section(page: Page, result: Result) -> None:
+def _section(page: Page, result: RowResult) -> None:
     """Why it is not met, and a chart."""
     name, shown = result.row.name, result.shown.excerpt
     why = f"<p>Known: {html.escape(KNOWN[name])}.</p>" if result.broken and name in KNOWN else ""
@@ -87,7 +87,7 @@ def _section(page: Page, result: Result) -> None:
     page.section(name, name, f"{html.escape(result.row.title)}: {state(result)}", why, chart)
 
 
-def _chart(shown: Excerpt, result: Result) -> Figure:
+def _chart(shown: Excerpt, result: RowResult) -> Figure:
     """Return what was longest wrong, over time; dots at the foot where a flag says so."""
     low, high = shown.value - SIGMAS * shown.sigma, shown.value + SIGMAS * shown.sigma
     values = np.concatenate((shown.truth, shown.value[np.isfinite(shown.value)]))

@@ -8,16 +8,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.estimator import Estimator
 from lever_cdkf.firmware.library import struct_dtype
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
-from ..envelope.firmware import MOTOR_LAG
-from ..envelope.motions import PERIOD, STRIDE, Motion, columns, lanes, stream, truth
-from ..envelope.plant import Lanes, Plant, grip_force
-from ..envelope.sensors import GRIP_NOISE, NOISE
+from ..batch.firmware import MOTOR_LAG
+from ..batch.motions import PERIOD, STRIDE, Motion, columns, lanes, stream, truth
+from ..batch.plant import BatchPlant, Lanes, grip_force
+from ..batch.sensors import GRIP_NOISE, NOISE
 from ..fast.library import Struct, lib
 from . import bus, readings
 from .bus import Bus, Interval
@@ -61,7 +61,7 @@ class Pilot:
     @cached_property
     def grip_force(self) -> FloatArray:
         """Of the hand on the lever in a flight without faults [N]; the motor does the same in all such."""
-        plant = Plant(self.lanes)
+        plant = BatchPlant(self.lanes)
         self._fly(plant, None, Config(), *self._right(False))
         force: FloatArray = grip_force(self.lanes, plant.theta, plant.theta_dot)[:, 0]
         return force
@@ -82,13 +82,13 @@ class Pilot:
             bus.freeze(sent, FREEZE)
         on_readings(read, sent.samples(time))
         on_bus(sent, time)
-        return self._fly(Plant(self.lanes), self.grip_force if grip else None, config, sent, read)
+        return self._fly(BatchPlant(self.lanes), self.grip_force if grip else None, config, sent, read)
 
     def _right(self, grip: bool) -> tuple[Bus, Readings]:
         random = stream("faults", self.seed)
         return Bus(self.count, PERIOD, grip, DITHER, random), Readings.right(self.count, PERIOD, random)
 
-    def _fly(self, plant: Plant, force: FloatArray | None, config: Config, sent: Bus, read: Readings) -> Record:
+    def _fly(self, plant: BatchPlant, force: FloatArray | None, config: Config, sent: Bus, read: Readings) -> Record:
         estimator, struct, frames = Estimator(config), Struct("channel_t"), sent.delivered()
         rows = (self.count - 1) // STRIDE + 1
         health = np.zeros(self.count, struct_dtype("lever_health_t"))

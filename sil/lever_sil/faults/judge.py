@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST
 from lever_cdkf.firmware.library import enum_names, lib
+from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from lever_cdkf.report.series import runs
 
+from ..batch.motions import PERIOD, STRIDE
 from ..envelope.measure import QUANTITIES, fault_mask
-from ..envelope.motions import PERIOD, STRIDE
 from .bus import Interval
 from .flight import Record
 
@@ -40,7 +40,7 @@ AT_LAST = 5.0
 
 
 @dataclass(frozen=True)
-class Must:
+class Requirement:
     """What a row demands. Besides, of every row: estimates are finite and not wrong without a flag, each sample is
     answered, torque keeps within the gate's limits, and the firmware is back in the end."""
 
@@ -87,25 +87,27 @@ class Verdict:
             self.broken.append(name)
 
 
-def judge(must: Must, record: Record, plain: Record, truth: Mapping[str, FloatArray], time: Interval) -> Verdict:
+def judge(
+    requirement: Requirement, record: Record, plain: Record, truth: Mapping[str, FloatArray], time: Interval
+) -> Verdict:
     """`plain` is the same flight without the fault."""
     verdict = Verdict()
     begin, end = (min(len(record.health), round(moment / PERIOD)) for moment in time)
     faults, modes = record.health["faults"], record.health["mode"]
     verdict.hold("not finite", _not_finite(record), 0)
     verdict.hold("unanswered", record.unanswered, 0)
-    _judge_torque(must, record, begin, end, verdict)
-    if must.unaffected:
+    _judge_torque(requirement, record, begin, end, verdict)
+    if requirement.unaffected:
         changed = np.count_nonzero(record.estimate.view(np.uint8) != plain.estimate.view(np.uint8))
         verdict.hold("estimates changed", float(changed), 0)
-    if must.flags:
-        shown = (faults[begin:end] & fault_mask(*must.flags)) != 0
-        verdict.hold("to flag", float(shown.argmax()) + 1 if shown.any() else math.inf, must.within)
-    if must.after:
-        shown = (faults[end : end + 3] & fault_mask(*must.after)) != 0
+    if requirement.flags:
+        shown = (faults[begin:end] & fault_mask(*requirement.flags)) != 0
+        verdict.hold("to flag", float(shown.argmax()) + 1 if shown.any() else math.inf, requirement.within)
+    if requirement.after:
+        shown = (faults[end : end + 3] & fault_mask(*requirement.after)) != 0
         verdict.hold("to flag after", float(shown.argmax()) + 1 if shown.any() else math.inf, 2)
     mode = enum_names("lever_mode")[int(modes[end - 1])]
-    if mode not in must.mode:
+    if mode not in requirement.mode:
         verdict.broken.append(f"mode {mode}")
     flagged = is_flagged(record)
     away = ((faults & fault_mask(*GONE)) != 0) | ~is_estimating(record)
@@ -135,7 +137,7 @@ def _not_finite(record: Record) -> int:
     return int(sum(np.count_nonzero(~np.isfinite(column)) for column in columns))
 
 
-def _judge_torque(must: Must, record: Record, begin: int, end: int, verdict: Verdict) -> None:
+def _judge_torque(requirement: Requirement, record: Record, begin: int, end: int, verdict: Verdict) -> None:
     """By the limits of the gate as shipped."""
     from lever_cdkf.firmware.config import Config
 
@@ -146,8 +148,8 @@ def _judge_torque(must: Must, record: Record, begin: int, end: int, verdict: Ver
     window = round(1.0 / PERIOD)
     square = np.convolve(torque**2, np.full(window, 1.0 / window), "valid")
     verdict.hold("torque rms", math.sqrt(float(square.max())), settings["torque_rms"] + step)
-    if must.torque_ends is not None:
-        closed = torque[begin + round(must.torque_ends / PERIOD) : end]
+    if requirement.torque_ends is not None:
+        closed = torque[begin + round(requirement.torque_ends / PERIOD) : end]
         verdict.hold("torque left", float(np.abs(closed).max()), 0.0)
 
 

@@ -16,7 +16,7 @@ Show = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
-class Result:
+class RowResult:
     """A row and what came of each pilot's flight."""
 
     row: Row
@@ -48,7 +48,7 @@ class Result:
         return sum(verdict.measured["covered"] for verdict in self.verdicts) / len(self.verdicts)
 
 
-def run(rows: Iterable[Row], seeds: int, show: Show) -> list[Result]:
+def run(rows: Iterable[Row], seeds: int, show: Show) -> list[RowResult]:
     """Return the results, in the order of the rows."""
     chosen = list(rows)
     verdicts: list[list[Verdict]] = [[] for _ in chosen]
@@ -56,7 +56,7 @@ def run(rows: Iterable[Row], seeds: int, show: Show) -> list[Result]:
         for i, verdict in enumerate(flights(chosen, Pilot(MOTION, seed))):
             verdicts[i].append(verdict)
             show(seed * len(chosen) + i + 1, seeds * len(chosen), chosen[i].name)
-    return [Result(row, of) for row, of in zip(chosen, verdicts, strict=True)]
+    return [RowResult(row, of) for row, of in zip(chosen, verdicts, strict=True)]
 
 
 def flights(rows: Sequence[Row], pilot: Pilot) -> Iterator[Verdict]:
@@ -68,4 +68,4 @@ def flights(rows: Sequence[Row], pilot: Pilot) -> Iterator[Verdict]:
         if like not in plain:
             plain[like] = pilot.fly(config, row.time, grip=row.grip, frozen=row.frozen)
         record = pilot.fly(config, row.time, row.on_bus, row.on_readings, row.grip, row.frozen)
-        yield judge(row.must, record, plain[like], pilot.truth, row.time)
+        yield judge(row.requirement, record, plain[like], pilot.truth, row.time)

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 
 from lever_cdkf.can import codec
 
-from ..envelope.motions import PERIOD, Motion
+from ..batch.motions import PERIOD, Motion
 from . import bus, readings
 from .bus import Interval
-from .judge import Must
+from .judge import Requirement
 
 MOTION = Motion(duration=40.0, dither=0.0)
 """The firmware makes the dither."""
@@ -49,24 +49,24 @@ _COAST_ENDS = 0.08
 """20 ms until an output is too old, 50 ms to close, and what a port waits for samples [s]."""
 _ABANDONED_ENDS = 1.06
 """A second after the last COMMAND that was accepted, and 50 ms to close [s]."""
-_BLIND = Must(("THETA",), 2, mode=("coast",), torque_ends=_COAST_ENDS)
+_BLIND = Requirement(("THETA",), 2, mode=("coast",), torque_ends=_COAST_ENDS)
 """No LEVER_SAMPLE."""
-_STANDS = Must(("CLOCK",), 2, mode=("run", "coast"), torque_ends=0.06)
+_STANDS = Requirement(("CLOCK",), 2, mode=("run", "coast"), torque_ends=0.06)
 """The sample clock does not advance."""
-_SILENCE = Must(after=("GAP",), torque_ends=_COAST_ENDS)
+_SILENCE = Requirement(after=("GAP",), torque_ends=_COAST_ENDS)
 """No sample at all: nothing is sent, which says it, and the next sample what happened."""
-_HEADLESS = Must(torque_ends=_ABANDONED_ENDS)
+_HEADLESS = Requirement(torque_ends=_ABANDONED_ENDS)
 """No COMMAND."""
-_ALONE: dict[str, Must] = {
+_ALONE: dict[str, Requirement] = {
     "LEVER_SAMPLE": _BLIND,
     "BASE_SAMPLE": _SILENCE,
-    "GRIP_SAMPLE": Must(),
+    "GRIP_SAMPLE": Requirement(),
     "COMMAND": _HEADLESS,
 }
 """When nothing of a message comes through."""
 
 
-_SPIKES = {"theta": Must(("THETA",), 1376), "theta_dot": Must(("THETA_DOT",), 1376)}
+_SPIKES = {"theta": Requirement(("THETA",), 1376), "theta_dot": Requirement(("THETA_DOT",), 1376)}
 """1 % of the samples: but for one in a million there is one in so many."""
 
 
@@ -76,7 +76,7 @@ class Row:
 
     name: str
     title: str
-    must: Must = field(default_factory=Must)
+    requirement: Requirement = field(default_factory=Requirement)
     on_bus: bus.Fault = bus.nothing
     on_readings: readings.Fault = readings.nothing
     time: Interval = TIME
@@ -87,12 +87,12 @@ class Row:
     quick: bool = False
 
 
-def _refused(message: str) -> Must:
+def _refused(message: str) -> Requirement:
     """Nothing of a message comes through, and it says so."""
     alone = _ALONE[message]
     if message == "BASE_SAMPLE":
         return replace(alone, after=_COMMUNICATION)  # without a sample it can only say so afterwards
-    return Must(_COMMUNICATION, 2, mode=alone.mode, torque_ends=alone.torque_ends)
+    return Requirement(_COMMUNICATION, 2, mode=alone.mode, torque_ends=alone.torque_ends)
 
 
 def _first(share: float) -> int:
@@ -104,10 +104,10 @@ def _damaged() -> Iterator[Row]:
     for message in MESSAGES:
         short, grip = _SHORT[message], message == "GRIP_SAMPLE"
         for byte in range(8):
-            must = _refused(message) if message == "COMMAND" else Must(_COMMUNICATION, 2)
+            requirement = _refused(message) if message == "COMMAND" else Requirement(_COMMUNICATION, 2)
             title = f"{message}: a bit of byte {byte} flipped in every {'' if message == 'COMMAND' else 'tenth '}frame"
             quick = byte == 3 and message == "BASE_SAMPLE"
-            yield Row(f"{short}_flip_{byte}", title, must, bus.flipped(message, byte), grip=grip, quick=quick)
+            yield Row(f"{short}_flip_{byte}", title, requirement, bus.flipped(message, byte), grip=grip, quick=quick)
         refused = _refused(message)
         yield Row(f"{short}_crc", f"{message}: every CRC wrong", refused, bus.wrong_crc(message), grip=grip)
         if message != "COMMAND":
@@ -119,9 +119,9 @@ def _damaged() -> Iterator[Row]:
             yield Row(f"{short}_length_{length}", title, refused, bus.short(message, length), grip=grip)
         for kind, mark in (("extended", bus.EXTENDED), ("remote", bus.REMOTE), ("error", bus.ERROR)):
             title = f"{message}: {kind} frames with its identifier besides"
-            must = Must(unaffected=True)
+            requirement = Requirement(unaffected=True)
             quick = (message, kind) == ("LEVER_SAMPLE", "extended")
-            yield Row(f"{short}_{kind}", title, must, bus.marked(message, mark), grip=grip, quick=quick)
+            yield Row(f"{short}_{kind}", title, requirement, bus.marked(message, mark), grip=grip, quick=quick)
 
 
 def _counters() -> Iterator[Row]:
@@ -129,7 +129,7 @@ def _counters() -> Iterator[Row]:
         short, grip = _SHORT[message], message == "GRIP_SAMPLE"
         title = f"{message}: each frame twice"
         yield Row(
-            f"{short}_twice", title, Must(_COMMUNICATION, 2), bus.repeated(message), grip=grip,
+            f"{short}_twice", title, Requirement(_COMMUNICATION, 2), bus.repeated(message), grip=grip,
             quick=message == "LEVER_SAMPLE",
         )  # fmt: skip
     for message in bus.SAMPLES:
@@ -144,16 +144,16 @@ def _counters() -> Iterator[Row]:
         skipped = alone if message != "BASE_SAMPLE" else _BLIND
         yield Row(f"{short}_counter_ahead", title, skipped, bus.counting(message, lambda i: i + 2), grip=grip)
     by_two = bus.counting(bus.SAMPLES, lambda i: 2 * i)
-    yield Row("counters_by_two", "all samples: the counter skips every second number", Must(), by_two)
+    yield Row("counters_by_two", "all samples: the counter skips every second number", Requirement(), by_two)
     back = bus.counting(bus.SAMPLES, lambda i: -i)
-    yield Row("counters_backwards", "all samples: the counter runs backwards", Must(_COMMUNICATION, 20), back)
-    hangs = Must(_COMMUNICATION, 2, torque_ends=_ABANDONED_ENDS)
+    yield Row("counters_backwards", "all samples: the counter runs backwards", Requirement(_COMMUNICATION, 20), back)
+    hangs = Requirement(_COMMUNICATION, 2, torque_ends=_ABANDONED_ENDS)
     yield Row("command_counter_frozen", "COMMAND: the last one again and again", hangs, bus.hanging_command())
     other = bus.commands(lambda _: bus.command(0))
     once = replace(hangs, torque_ends=_ABANDONED_ENDS + 1.25)  # its first one is that of a new sender
     yield Row("command_counter_elsewhere", "COMMAND: the counter jumps and then stands", once, other)
     ahead = bus.commands(lambda i: bus.command(5 * i))
-    yield Row("command_counter_skips", "COMMAND: the counter skips four of five", Must(), ahead)
+    yield Row("command_counter_skips", "COMMAND: the counter skips four of five", Requirement(), ahead)
 
 
 def _missing() -> Iterator[Row]:
@@ -163,60 +163,64 @@ def _missing() -> Iterator[Row]:
             title = f"{message}: {percent} % lost at random"
             quick = (message, percent) == ("LEVER_SAMPLE", 10)
             within = _first(percent / 100) + 3
-            must = Must(_LOST[message], within, mode=("run", "coast"))
-            yield Row(f"{short}_lost_{percent}", title, must, bus.lost(message, percent / 100), grip=grip, quick=quick)
+            requirement = Requirement(_LOST[message], within, mode=("run", "coast"))
+            yield Row(
+                f"{short}_lost_{percent}", title, requirement, bus.lost(message, percent / 100), grip=grip, quick=quick
+            )
         for length, every in ((0.05, 0.5), (0.3, 2.0), (2.0, 20.0)):
             title = f"{message}: lost for {length:g} s at a time"
             within = 1 + round(length / PERIOD) if message == "BASE_SAMPLE" else 1
-            must = Must(_LOST[message], within)
-            yield Row(f"{short}_burst_{length:g}s", title, must, bus.bursts(message, length, every), grip=grip)
+            requirement = Requirement(_LOST[message], within)
+            yield Row(f"{short}_burst_{length:g}s", title, requirement, bus.bursts(message, length, every), grip=grip)
     for percent in (1, 10, 50):
         name, title = f"samples_lost_{percent}", f"{percent} % of all samples lost at random"
-        must = Must(("GAP",), _first(percent / 100) + 1)
-        yield Row(name, title, must, bus.samples_lost(percent / 100))
+        requirement = Requirement(("GAP",), _first(percent / 100) + 1)
+        yield Row(name, title, requirement, bus.samples_lost(percent / 100))
     yield Row("silence_0.3s", "nothing arrives for 0.3 s", _SILENCE, bus.bursts(MESSAGES, 1.0, 20.0), time=(15.0, 15.3))
     silence = bus.bursts(MESSAGES, 20.0, 20.0)
     yield Row("silence_10s", "nothing arrives for 10 s", _SILENCE, silence, quick=True)
-    yield Row("command_lost_50", "COMMAND: half of them lost", Must(), bus.lost("COMMAND", 0.5))
+    yield Row("command_lost_50", "COMMAND: half of them lost", Requirement(), bus.lost("COMMAND", 0.5))
     yield Row("command_lost", "COMMAND: none arrives", _HEADLESS, bus.lost("COMMAND", 1.1), quick=True)
 
 
 def _late() -> Iterator[Row]:
     for message in bus.SAMPLES[:2]:
         short, grip = _SHORT[message], message == "GRIP_SAMPLE"
-        must = _BLIND if message == "LEVER_SAMPLE" else Must()
-        yield Row(f"{short}_after_base", f"{message}: after its BASE_SAMPLE", must, bus.late(message, 0.25), grip=grip)
-        yield Row(f"{short}_late", f"{message}: 5 samples late", must, bus.late(message, 5.0), grip=grip)
+        requirement = _BLIND if message == "LEVER_SAMPLE" else Requirement()
+        yield Row(
+            f"{short}_after_base", f"{message}: after its BASE_SAMPLE", requirement, bus.late(message, 0.25), grip=grip
+        )
+        yield Row(f"{short}_late", f"{message}: 5 samples late", requirement, bus.late(message, 5.0), grip=grip)
     for message in bus.SAMPLES:
         short, grip = _SHORT[message], message == "GRIP_SAMPLE"
         title = f"{message}: each second frame after the next"
-        must = Must(_COMMUNICATION, 5, mode=("run", "coast"))
-        yield Row(f"{short}_swapped", title, must, bus.late(message, 1.05, 2), grip=grip)
+        requirement = Requirement(_COMMUNICATION, 5, mode=("run", "coast"))
+        yield Row(f"{short}_swapped", title, requirement, bus.late(message, 1.05, 2), grip=grip)
     yield Row("base_late", "BASE_SAMPLE: 5 samples late", replace(_BLIND, within=7), bus.late("BASE_SAMPLE", 5.0))
-    yield Row("all_late", "all samples 20 ms late", Must(), bus.late(bus.SAMPLES, 20.0))
+    yield Row("all_late", "all samples 20 ms late", Requirement(), bus.late(bus.SAMPLES, 20.0))
     yield Row(
         "lever_stale",
         "LEVER_SAMPLE: old content, counter goes on",
-        Must(("THETA", "THETA_DOT"), _STUCK, mode=("run", "coast")),
+        Requirement(("THETA", "THETA_DOT"), _STUCK, mode=("run", "coast")),
         bus.stale("LEVER_SAMPLE"),
     )
     yield Row(
         "base_stale", "BASE_SAMPLE: old content and time, counter goes on",
         _STANDS, bus.stale("BASE_SAMPLE"), quick=True,
     )  # fmt: skip
-    still = Must(_FLAG["grip_force"], _GRIP_WRONG)
+    still = Requirement(_FLAG["grip_force"], _GRIP_WRONG)
     yield Row("grip_stale", "GRIP_SAMPLE: old content, counter goes on", still, bus.stale("GRIP_SAMPLE"), grip=True)
 
 
 def _other_senders() -> Iterator[Row]:
-    load = Must(unaffected=True)
-    babbling = Must(
+    load = Requirement(unaffected=True)
+    babbling = Requirement(
         (*_COMMUNICATION, "CLOCK"), 50, mode=("init", "align", "run", "coast", "frozen")
     )  # a CRC in 256 is right
     yield Row("foreign_load", "100 % bus load of other identifiers", load, bus.foreign_load(), quick=True)
     yield Row("babble_10", "100 frames/s of random data with our identifiers", babbling, bus.babble(10))
     yield Row("babble_1", "1,000 frames/s of the same", replace(babbling, within=10), bus.babble(1))
-    yield Row("second_estimator", "another estimator on the bus", Must(("DUPLICATE",), 2), bus.duplicate())
+    yield Row("second_estimator", "another estimator on the bus", Requirement(("DUPLICATE",), 2), bus.duplicate())
 
 
 def _commands() -> Iterator[Row]:
@@ -229,30 +233,30 @@ def _commands() -> Iterator[Row]:
     models: list[dict[str, codec.Value]] = [
         {"model": name} for name in ("lever", "linear_physical", "linear_black_box", "hand")
     ]
-    anew = Must(mode=("init", "align"), torque_ends=0.06)
+    anew = Requirement(mode=("init", "align"), torque_ends=0.06)
     yield Row(
-        "command_flood", "10 COMMANDs in each sample that change nothing", Must(unaffected=True),
+        "command_flood", "10 COMMANDs in each sample that change nothing", Requirement(unaffected=True),
         bus.flood([{}], {}, 10), quick=True,
     )  # fmt: skip
     yield Row("model_switched", "COMMAND: another model in each sample", anew, bus.flood(models, right), quick=True)
     yield Row("reset_flood", "COMMAND: a reset in each sample", anew, bus.flood([{"request": "reset"}], right))
-    toggles: dict[str, tuple[list[dict[str, codec.Value]], Must]] = {
+    toggles: dict[str, tuple[list[dict[str, codec.Value]], Requirement]] = {
         "estimator_switched": ([{"estimator": "joint"}, {"estimator": "dual"}], anew),
         "preload_switched": ([{"preload": "fixed"}, {"preload": "trim"}], anew),
-        "adaptation_switched": ([{"adaptation": "annealing"}, {"adaptation": "forgetting"}], Must()),
-        "freeze_switched": ([{"request": "freeze"}, {"request": "run"}], Must(mode=("run", "frozen"))),
-        "dither_switched": ([{"dither_rms": 0.0}, {"dither_rms": 0.3}], Must()),
+        "adaptation_switched": ([{"adaptation": "annealing"}, {"adaptation": "forgetting"}], Requirement()),
+        "freeze_switched": ([{"request": "freeze"}, {"request": "run"}], Requirement(mode=("run", "frozen"))),
+        "dither_switched": ([{"dither_rms": 0.0}, {"dither_rms": 0.3}], Requirement()),
     }
-    for name, (values, must) in toggles.items():
+    for name, (values, requirement) in toggles.items():
         title = f"COMMAND: {name.removesuffix('_switched')} switched in each sample"
-        yield Row(name, title, must, bus.flood(values, {"request": "run", **right}))
+        yield Row(name, title, requirement, bus.flood(values, {"request": "run", **right}))
     most = bus.flood([{"dither_rms": 60.0}], right)
-    yield Row("dither_most", "COMMAND: 60 N m of dither", Must(), most)
+    yield Row("dither_most", "COMMAND: 60 N m of dither", Requirement(), most)
     unknown = bus.commands(bus.unknown_command, 10, True)
     yield Row(
         "command_unknown",
         "COMMAND: 100 in a second that ask for a model that is not there",
-        Must(_COMMUNICATION, 2),
+        Requirement(_COMMUNICATION, 2),
         unknown,
     )
 
@@ -261,14 +265,14 @@ def _readings() -> Iterator[Row]:
     for signal, word in _SIGNAL.items():
         grip = signal == "grip_force"
         own = _FLAG[signal]
-        gone, still = Must(own, 1), Must(own, _STUCK)
-        sign, gain = Must((*own, "BASE", "MISMATCH"), _WRONG), Must()
+        gone, still = Requirement(own, 1), Requirement(own, _STUCK)
+        sign, gain = Requirement((*own, "BASE", "MISMATCH"), _WRONG), Requirement()
         if signal == "z_ddot":
-            sign = Must(own, _WRONG)
+            sign = Requirement(own, _WRONG)
         if signal == "tau_m":
-            sign = gain = Must(own, _WRONG)
+            sign = gain = Requirement(own, _WRONG)
         if grip:
-            gone, still, sign, gain = Must(), *[Must(own, _GRIP_WRONG)] * 3
+            gone, still, sign, gain = Requirement(), *[Requirement(own, _GRIP_WRONG)] * 3
         # what moves the lever may be a step or a drift of an output, and a pilot's grip what a gain of it may be; what
         # the motor does is known
         faults = {
@@ -277,17 +281,17 @@ def _readings() -> Iterator[Row]:
             "saturated": ("saturated", readings.reads(signal, readings.GREATEST[signal]), still if grip else gone),
             "stuck": ("stuck", readings.stuck(signal), still),
             "zero": ("zero", readings.reads(signal, 0.0), still),
-            "step": ("off by a step", readings.step(signal), Must()),
-            "drift": ("off by a ramp to the same", readings.drift(signal), Must()),
+            "step": ("off by a step", readings.step(signal), Requirement()),
+            "drift": ("off by a ramp to the same", readings.drift(signal), Requirement()),
             "sign": ("of the wrong sign", readings.scaled(signal, -1.0), sign),
             "gain_half": ("half as large", readings.scaled(signal, 0.5), gain),
             "gain_double": ("twice as large", readings.scaled(signal, 2.0), gain),
-            "gain_drift": ("gain going to 1.5", readings.gain_drift(signal, 1.5), Must()),
-            "spikes": ("1 % of the values far off", readings.spikes(signal), _SPIKES.get(signal, Must())),
+            "gain_drift": ("gain going to 1.5", readings.gain_drift(signal, 1.5), Requirement()),
+            "spikes": ("1 % of the values far off", readings.spikes(signal), _SPIKES.get(signal, Requirement())),
         }
-        for name, (title, spoil, must) in faults.items():
+        for name, (title, spoil, requirement) in faults.items():
             quick = (signal, name) in (("theta", "stuck"), ("z_ddot", "sign"), ("tau_m", "invalid"))
-            yield Row(f"{signal}_{name}", f"{word} {title}", must, on_readings=spoil, grip=grip, quick=quick)
+            yield Row(f"{signal}_{name}", f"{word} {title}", requirement, on_readings=spoil, grip=grip, quick=quick)
     blind = readings.reads("theta", math.nan), readings.reads("theta_dot", math.nan)
 
     def neither(read: readings.Readings, during: bus.Indices) -> None:
@@ -303,31 +307,37 @@ def _clocks() -> Iterator[Row]:
     yield Row("clock_stands", "the sender's clock stands", stands, on_readings=clock(lambda t: 0.0 * t), quick=True)
     yield Row("clock_back", "the sender's clock runs backwards", stands, on_readings=clock(lambda t: -t))
     yield Row("clock_crawls", "the sender's clock runs at a tenth", stands, on_readings=clock(lambda t: 0.1 * t))
-    yield Row("clock_half", "the sender's clock runs at half its rate", Must(), on_readings=clock(lambda t: 0.5 * t))
-    yield Row("clock_1.1", "the sender's clock is 10 % fast", Must(), on_readings=clock(lambda t: 1.1 * t))
+    yield Row(
+        "clock_half", "the sender's clock runs at half its rate", Requirement(), on_readings=clock(lambda t: 0.5 * t)
+    )
+    yield Row("clock_1.1", "the sender's clock is 10 % fast", Requirement(), on_readings=clock(lambda t: 1.1 * t))
     yield Row(
         "clock_2",
         "the sender's clock is twice as fast",
-        Must(("GAP",), 2),
+        Requirement(("GAP",), 2),
         on_readings=clock(lambda t: 2.0 * t),
     )
-    yield Row("clock_wraps", "the sender's clock passes 2³² µs", Must(), on_readings=readings.clock_wraps, quick=True)
+    yield Row(
+        "clock_wraps", "the sender's clock passes 2³² µs", Requirement(), on_readings=readings.clock_wraps, quick=True
+    )
     jumps = {"0.1s": 0.1, "1s": 1.0, "1h": 3600.0, "back_0.1s": -0.1, "back_10s": -10.0}
     for name, seconds in jumps.items():
         flag = ("GAP",) if 0.0 < seconds < 2000.0 else moving  # half a turn of 32 bits is the past
-        must = Must(flag, 1, mode=("run", "align"))
+        requirement = Requirement(flag, 1, mode=("run", "align"))
         title = f"the sender's clock jumps by {seconds:g} s"
-        yield Row(f"clock_jumps_{name}", title, must, on_readings=readings.clock_offset(seconds), time=(15.0, 16.0))
+        yield Row(
+            f"clock_jumps_{name}", title, requirement, on_readings=readings.clock_offset(seconds), time=(15.0, 16.0)
+        )
 
 
 def _frozen(row: Row) -> Row:
     """Return the same rows while the parameters are held, which hides no fault."""
-    mode = tuple(dict.fromkeys("frozen" if name in ("run", "coast") else name for name in row.must.mode))
+    mode = tuple(dict.fromkeys("frozen" if name in ("run", "coast") else name for name in row.requirement.mode))
     return replace(
         row,
         name=f"{row.name}{FROZEN}",
         title=f"{row.title}, parameters frozen",
-        must=replace(row.must, mode=mode),
+        requirement=replace(row.requirement, mode=mode),
         frozen=True,
     )
 
@@ -335,14 +345,14 @@ def _frozen(row: Row) -> Row:
 def _from_power_on(row: Row) -> Row:
     """Return the same fault from the first sample on, in ALIGN already. What is stuck shows half a second after
     ALIGN at the latest; what only the innovations show, any way, two seconds after the first that may be judged."""
-    must, wrong = row.must, row.must.within == _WRONG
-    later = _JUDGED if wrong else _ALIGNED if row.must.within == _STUCK else 0
-    flags = (*must.flags, "BASE", "MISMATCH", "INNOVATION", "CALIBRATION") if wrong else must.flags
+    requirement, wrong = row.requirement, row.requirement.within == _WRONG
+    later = _JUDGED if wrong else _ALIGNED if row.requirement.within == _STUCK else 0
+    flags = (*requirement.flags, "BASE", "MISMATCH", "INNOVATION", "CALIBRATION") if wrong else requirement.flags
     return replace(
         row,
         name=f"{row.name}{FROM_POWER_ON}",
         title=f"{row.title}, from power-on",
-        must=replace(must, flags=flags, within=must.within + later),
+        requirement=replace(requirement, flags=flags, within=requirement.within + later),
         time=(0.0, TIME[1] - TIME[0]),
     )
 
@@ -357,11 +367,11 @@ def _failing() -> Iterator[Row]:
 def _coasting() -> Iterator[Row]:
     """Yield faults of the base acceleration while no lever signal comes, for its own stillness is all that shows
     them. Torque has ended, and cannot be compared."""
-    must = replace(_BLIND, flags=("BASE",), within=_STUCK)
+    requirement = replace(_BLIND, flags=("BASE",), within=_STUCK)
     faults = {"stuck": ("stuck", readings.stuck("z_ddot")), "zero": ("zero", readings.reads("z_ddot", 0.0))}
     for name, (words, spoil) in faults.items():
         title = f"z̈ {words} while no LEVER_SAMPLE comes"
-        yield Row(f"z_ddot_{name}_coasting", title, must, bus.lost("LEVER_SAMPLE", 1.1), spoil)
+        yield Row(f"z_ddot_{name}_coasting", title, requirement, bus.lost("LEVER_SAMPLE", 1.1), spoil)
 
 
 def _table() -> Iterator[Row]:

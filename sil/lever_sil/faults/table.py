@@ -6,45 +6,46 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from lever_cdkf.tables import Row
+from lever_cdkf.cli.tables import Row
 
 from . import judge
-from .matrix import Result
+from .matrix import RowResult
 from .rows import KNOWN
 
 HOLDS, MISSED, SILENT = "holds", "MISSED", "SILENT"
 _WORD = {"silent": "wrong without a flag", "right": "too rarely right"}
 
 
-def state(result: Result) -> str:
+def state(result: RowResult) -> str:
     """In a word."""
     if result.silent:
         return SILENT
     return MISSED if result.broken else HOLDS
 
 
-def missed(result: Result) -> str:
+def missed(result: RowResult) -> str:
     """Return what it does not keep."""
     return ", ".join(_WORD.get(what, what) for what in result.broken)
 
 
-def demands(must: judge.Must) -> str:
+def demands(requirement: judge.Requirement) -> str:
     """Return what a row demands, in short."""
     parts = []
-    if must.unaffected:
+    if requirement.unaffected:
         parts.append("not a bit changes")
-    if must.flags:
-        parts.append(f"{' or '.join(must.flags)} within {must.within} sample{'s' if must.within > 1 else ''}")
-    if must.after:
-        parts.append(f"{' or '.join(must.after)} at its end")
-    if not must.unaffected:
-        parts.append(f"mode {' or '.join(must.mode)}")
-    if must.torque_ends is not None:
-        parts.append(f"no torque after {must.torque_ends:g} s")
+    if requirement.flags:
+        samples = "samples" if requirement.within > 1 else "sample"
+        parts.append(f"{' or '.join(requirement.flags)} within {requirement.within} {samples}")
+    if requirement.after:
+        parts.append(f"{' or '.join(requirement.after)} at its end")
+    if not requirement.unaffected:
+        parts.append(f"mode {' or '.join(requirement.mode)}")
+    if requirement.torque_ends is not None:
+        parts.append(f"no torque after {requirement.torque_ends:g} s")
     return ", ".join(parts)
 
 
-def lines(results: Sequence[Result]) -> list[Row]:
+def lines(results: Sequence[RowResult]) -> list[Row]:
     """For a terminal."""
     return [
         {
@@ -61,9 +62,9 @@ def lines(results: Sequence[Result]) -> list[Row]:
     ]
 
 
-def _whole(result: Result, figure: str) -> str:
+def _whole(result: RowResult, figure: str) -> str:
     """Return a figure that not all rows have."""
-    if not result.row.must.flags:
+    if not result.row.requirement.flags:
         return ""
     value = result.worst(figure)
     return "never" if math.isinf(value) else f"{value:.0f}"
@@ -74,13 +75,13 @@ def _number(value: float) -> float | None:
     return float(f"{value:.3g}") if math.isfinite(value) else None
 
 
-def rows(results: Sequence[Result]) -> list[dict[str, Any]]:
+def rows(results: Sequence[RowResult]) -> list[dict[str, Any]]:
     """As JSON has them: of every figure the worst flight."""
     return [
         {
             "name": result.row.name,
             "title": result.row.title,
-            "must": demands(result.row.must),
+            "must": demands(result.row.requirement),
             "result": state(result),
             "broken": result.broken,
             "known": KNOWN.get(result.row.name),
@@ -91,7 +92,7 @@ def rows(results: Sequence[Result]) -> list[dict[str, Any]]:
     ]
 
 
-def counts(results: Sequence[Result]) -> dict[str, int]:
+def counts(results: Sequence[RowResult]) -> dict[str, int]:
     """Return how many rows there are, how many miss what they must, how many of these are not known to, and in how
     many the firmware was silently wrong."""
     return {
@@ -102,6 +103,6 @@ def counts(results: Sequence[Result]) -> dict[str, int]:
     }
 
 
-def unexpected(results: Sequence[Result]) -> list[str]:
+def unexpected(results: Sequence[RowResult]) -> list[str]:
     """Return rows that miss what they must, and are not known to."""
     return [result.row.name for result in results if result.broken and result.row.name not in KNOWN]

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.firmware.library import ffi
+from lever_cdkf.numeric.arrays import FloatArray
 
 from ..fast.closed_loop import Loop
 from ..scenarios import inputs as scenario_inputs

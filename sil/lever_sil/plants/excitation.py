@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 
 from ..toml_tables import SIGNAL, quantity, read_kind, whole, wholes
 

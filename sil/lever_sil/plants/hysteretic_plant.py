@@ -23,8 +23,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.models.transfer import Transfer
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from . import lever_plant
@@ -102,8 +102,8 @@ class Hysteretic(Truth):
         denominator[:, 2:] += gain * elements
         return Transfer(alone.numerator * every, denominator)
 
-    def body(self, conditions: Conditions) -> Plant:
-        return Plant(self, conditions)
+    def body(self, conditions: Conditions) -> HystereticPlant:
+        return HystereticPlant(self, conditions)
 
 
 def coefficients(truth: Hysteretic) -> tuple[FloatArray, ...]:
@@ -145,7 +145,7 @@ def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_
         yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
 
 
-class Plant:
+class HystereticPlant:
     """Lever, arm and motor: a truth.Body."""
 
     def __init__(self, truth: Hysteretic, conditions: Conditions) -> None:

@@ -25,9 +25,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.models.transfer import Transfer
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.numeric.arrays import FloatArray
+from lever_cdkf.text.units import GRAVITY
 from numpy.typing import NDArray
 
 from . import truth as truths
@@ -194,8 +194,8 @@ class LeverTruth(truths.Truth):
     def _pilot(self, samples: NDArray[np.intp] | NDArray[np.bool_]) -> Truth:
         return Truth(*(column[samples] for column in vars(self.pilot).values()))
 
-    def body(self, conditions: Conditions) -> Plant:
-        return Plant(self.lever, self.pilot, self.preload, conditions)
+    def body(self, conditions: Conditions) -> LeverPlant:
+        return LeverPlant(self.lever, self.pilot, self.preload, conditions)
 
 
 def coefficients(lever: Lever, truth: Truth, kind: Preload) -> tuple[FloatArray, ...]:
@@ -217,7 +217,7 @@ def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_
         yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
 
 
-class Plant:
+class LeverPlant:
     """Lever, arm and motor: a truth.Body, which starts at rest at the equilibrium.
 
     The grip force is what the lever's own equation of motion, over the last period, leaves to the hand; process noise

@@ -20,8 +20,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.models.transfer import Transfer
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from .truth import Conditions, Dynamics, Truth
@@ -65,8 +65,8 @@ class LinearTruth(Truth):
         denominator = (np.ones_like(system.damping), system.damping, system.stiffness)
         return Transfer(system.gain[samples, None], np.stack(denominator, axis=1)[samples])
 
-    def body(self, conditions: Conditions) -> Plant:
-        return Plant(self.system, self.felt(conditions))
+    def body(self, conditions: Conditions) -> LinearPlant:
+        return LinearPlant(self.system, self.felt(conditions))
 
     def felt(self, conditions: Conditions) -> Conditions:
         """Return the conditions with the base acceleration that drives the system."""
@@ -126,7 +126,7 @@ def _rows(system: System, conditions: Conditions) -> Iterator[_Row]:
         yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
 
 
-class Plant:
+class LinearPlant:
     """System and motor: a truth.Body."""
 
     def __init__(self, system: System, conditions: Conditions) -> None:

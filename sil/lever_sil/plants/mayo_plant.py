@@ -24,11 +24,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.models.transfer import Transfer
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
-from .linear_plant import LinearTruth, Plant, System
+from .linear_plant import LinearPlant, LinearTruth, System
 from .truth import Block, Conditions
 
 
@@ -90,8 +90,8 @@ class Mayo(LinearTruth):
         np.cumsum(0.5 * conditions.period * (z_ddot[1:] + z_ddot[:-1]), out=z_dot[1:])
         return dataclasses.replace(conditions, z_ddot=z_ddot + self.hand.outside * z_dot)
 
-    def body(self, conditions: Conditions) -> Plant:
-        return Plant(self.system, _InSpace(**vars(conditions), outside=self.hand.outside))
+    def body(self, conditions: Conditions) -> LinearPlant:
+        return LinearPlant(self.system, _InSpace(**vars(conditions), outside=self.hand.outside))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 
 from ..toml_tables import choice, item, quantity, read_kind, read_table, tables
 from . import hysteretic_plant, lever_plant, linear_plant, mayo_plant, reflex_plant, two_dof_plant

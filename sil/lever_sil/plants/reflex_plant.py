@@ -23,8 +23,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.models.transfer import Transfer
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from . import lever_plant
@@ -79,8 +79,8 @@ class Reflex(Truth):
         denominator[:, 1:] += _times(late, behind)
         return Transfer(_times(alone.numerator, ahead), denominator)
 
-    def body(self, conditions: Conditions) -> Plant:
-        return Plant(self, conditions)
+    def body(self, conditions: Conditions) -> ReflexPlant:
+        return ReflexPlant(self, conditions)
 
 
 def _pade(power: int) -> float:
@@ -104,7 +104,7 @@ def late(truth: Reflex, period: float) -> float:
     return truth.delay / period - 0.5
 
 
-class Plant(lever_plant.Plant):
+class ReflexPlant(lever_plant.LeverPlant):
     """Lever, arm with reflex and motor: a truth.Body."""
 
     def __init__(self, truth: Reflex, conditions: Conditions) -> None:

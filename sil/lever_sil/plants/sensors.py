@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import BoolArray, FloatArray
+from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from numpy.typing import NDArray
 
 from ..toml_tables import SIGNAL, choice, item, quantity, read_kind, read_table, tables

@@ -14,7 +14,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 
 from ..toml_tables import SIGNAL, Place, Reader, item, quantities, quantity, read_kind, read_list, read_quantity
 from . import excitation

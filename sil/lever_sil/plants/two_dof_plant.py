@@ -32,8 +32,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.models.transfer import Transfer
+from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from . import lever_plant
@@ -87,8 +87,8 @@ class TwoDof(Truth):
         numerator = forcing * trunk - rise * at["m_t"] * arm
         return Transfer(numerator, _product(own + rise**2 * arm, trunk) - rise**2 * _product(arm, arm))
 
-    def body(self, conditions: Conditions) -> Plant:
-        return Plant(self, conditions)
+    def body(self, conditions: Conditions) -> TwoDofPlant:
+        return TwoDofPlant(self, conditions)
 
 
 def _product(left: FloatArray, right: FloatArray) -> FloatArray:
@@ -118,7 +118,7 @@ def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_
         yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
 
 
-class Plant:
+class TwoDofPlant:
     """Lever, arm, trunk and motor: a truth.Body; `s` and `s_dot` are the trunk's [m, m/s]."""
 
     def __init__(self, truth: TwoDof, conditions: Conditions) -> None:

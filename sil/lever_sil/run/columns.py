@@ -6,8 +6,8 @@ Where a frame of the estimator comes at a divided rate, its values are held unti
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.can import codec, fields
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_cdkf.results.feedthrough import FEEDTHROUGH
 from lever_cdkf.results.trace import (
     CORRECTION,

@@ -12,7 +12,7 @@ from lever_cdkf.can.commander import refusal, result_of
 from lever_cdkf.can.identity import Identity
 
 from ..fast import closed_loop, plants
-from ..fast.closed_loop import Traffic
+from ..fast.closed_loop import BusFrames
 from ..scenarios.inputs import Inputs, prepare
 from ..scenarios.scenario import Scenario
 from . import loop
@@ -62,18 +62,18 @@ def _run_in_c(
     return Recording(scenario, inputs, traffic, theta, theta_dot, tau_m, given.unanswered, given.misplaced, identity)
 
 
-def _joined(parts: Sequence[Traffic]) -> Traffic:
-    return Traffic(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Traffic)))
+def _joined(parts: Sequence[BusFrames]) -> BusFrames:
+    return BusFrames(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(BusFrames)))
 
 
-def _identity(traffic: Traffic) -> Identity:
+def _identity(traffic: BusFrames) -> Identity:
     identity, identifier = Identity(), codec.message("IDENTITY").frame_id
     for data in traffic.data[traffic.identifier == identifier]:
         identity.take(codec.decode(identifier, bytes(data))[1])
     return identity
 
 
-def _refusal(traffic: Traffic) -> str:
+def _refusal(traffic: BusFrames) -> str:
     """Return what the last COMMAND_ACK says."""
     acknowledged = traffic.data[traffic.identifier == codec.message("COMMAND_ACK").frame_id]
     fields = codec.decode_columns("COMMAND_ACK", acknowledged[-1:])

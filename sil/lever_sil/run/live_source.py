@@ -7,9 +7,9 @@ import time
 
 import can
 import numpy as np
-from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.can.bus import LeverBus
 from lever_cdkf.firmware.config import Config
+from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
 from lever_cdkf.watch.sources import Source, as_frame
 
 from ..plants.truth import Truth

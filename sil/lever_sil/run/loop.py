@@ -18,14 +18,14 @@ from dataclasses import dataclass, field
 
 import can
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.can import codec
 from lever_cdkf.can.commander import ACCEPTED, SEQUENCE, Commander, refusal, result_of
 from lever_cdkf.can.identity import Identity
 from lever_cdkf.errors import LeverError, SettingsError
+from lever_cdkf.numeric.arrays import FloatArray
 
 from ..aircraft.flight import Flight
-from ..fast.closed_loop import Traffic
+from ..fast.closed_loop import BusFrames
 from ..plants import sensors
 from ..plants.truth import Body
 from ..scenarios.inputs import Inputs, conditions, flight, prepare, readings
@@ -70,7 +70,7 @@ class Recording:
 
     scenario: Scenario
     inputs: Inputs
-    traffic: Traffic = field(default_factory=Traffic)
+    traffic: BusFrames = field(default_factory=BusFrames)
     theta: FloatArray = field(default_factory=lambda: np.empty(0))
     """True angle of the lever [rad], its rate [rad/s] and the motor's torque [N m] at the samples."""
     theta_dot: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -118,7 +118,7 @@ class _Tape:
         return Recording(
             self.scenario,
             self.inputs,
-            Traffic(np.array(self.identifier, dtype=np.uint16), np.array(self.sample, dtype=np.uint32), data),
+            BusFrames(np.array(self.identifier, dtype=np.uint16), np.array(self.sample, dtype=np.uint32), data),
             np.array(self.theta),
             np.array(self.theta_dot),
             np.array(self.tau_m),

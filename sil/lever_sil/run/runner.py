@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 import can
 import numpy as np
 from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.cli.formats import FORMATS
 from lever_cdkf.errors import LeverError
 from lever_cdkf.exports.signal_files import SignalFiles
-from lever_cdkf.extras import missing
-from lever_cdkf.files import Outputs, make_folder, write_text, writing
-from lever_cdkf.formats import FORMATS
-from lever_cdkf.provenance import provenance
 from lever_cdkf.results.summary import SimulationSummary, text
 from lever_cdkf.results.trace import Trace
+from lever_cdkf.runtime.extras import missing
+from lever_cdkf.runtime.files import Outputs, make_folder, write_text, writing
+from lever_cdkf.runtime.provenance import provenance
 from numpy.typing import NDArray
 
 from ..scenarios.scenario import Scenario
@@ -36,7 +36,7 @@ _BOUND = 1e9
 
 
 @dataclass(frozen=True)
-class Result:
+class SimulationResult:
     """What a simulation gives: the columns of trace.csv, the content of summary.json, and every frame on the bus."""
 
     trace: Trace
@@ -56,7 +56,7 @@ def simulate(
     inputs: Sequence[str | Path] = (),
     story: Callable[[], Story] | None = None,
     snapshots: float | None = None,
-) -> Result:
+) -> SimulationResult:
     """Run `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judge it;
     with `out_dir` also write bus.log, the signals in `formats` (formats.FORMATS), report.html (with the extra `report`)
     and summary.json there, all or none. `channel` is the bus's name in bus.log; `inputs` are files that the scenario is
@@ -85,8 +85,8 @@ def simulate(
     untimed = summary.build(recording, columns)
     if out_dir is not None:
         files = _Files(out_dir, channel, formats, inputs, story)
-        files.write(Result(columns, untimed, frames), published(recording, frames), start)
-    return Result(columns, untimed.timed(clock.perf_counter() - start), frames)
+        files.write(SimulationResult(columns, untimed, frames), published(recording, frames), start)
+    return SimulationResult(columns, untimed.timed(clock.perf_counter() - start), frames)
 
 
 def _check_bounded(recording: Recording) -> None:
@@ -112,7 +112,7 @@ class _Files:
     inputs: Sequence[str | Path]
     story: Callable[[], Story] | None
 
-    def write(self, result: Result, published: NDArray[np.bool_], start: float) -> None:
+    def write(self, result: SimulationResult, published: NDArray[np.bool_], start: float) -> None:
         """Write the files; summary.json comes last, so that its wall time is of everything."""
         from lever_cdkf.report import write_report
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-from lever_cdkf import interrupts
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.cli.tables import Row, Tables
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_cdkf.results.summary import SimulationSummary
 from lever_cdkf.results.whiteness import CANNOT_SEE
-from lever_cdkf.tables import Row, Tables
+from lever_cdkf.runtime import interrupts
 
 from .summary import kept_limits, missed_limits
 

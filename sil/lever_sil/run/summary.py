@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.native import enum_names
 from lever_cdkf.firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
+from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from lever_cdkf.results import bounce, nis, summary, trust, whiteness
 from lever_cdkf.results.faults import FaultCounts
 from lever_cdkf.results.nis import Innovations, Nis, freedom

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.can.codec import Value
 from lever_cdkf.can.commander import KEEP_ALIVE
+from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 
 from ..aircraft.flight import Flight
 from ..plants import excitation, sensors

@@ -17,17 +17,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.errors import SettingsError
 from lever_cdkf.firmware import quantities
 from lever_cdkf.firmware.aircraft import AircraftResponse
 from lever_cdkf.firmware.config import CHOICES, Setting
 from lever_cdkf.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.firmware.settings_file import setting_value
-from lever_cdkf.near_names import near_names
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_cdkf.results.trace import CONVERGED_AFTER
-from lever_cdkf.toml_text import MOST_NESTED
-from lever_cdkf.units import UnitError
+from lever_cdkf.text.suggestions import nearest_names
+from lever_cdkf.text.toml_text import MOST_NESTED
+from lever_cdkf.text.units import UnitError
 
 from ..aircraft.aircraft import Coupled, read_aircraft
 from ..aircraft.response_table import known_response
@@ -100,7 +100,7 @@ def _read_numbers(readers: Mapping[str, Reader]) -> Reader:
             raise place.error(f"{values!r} is not a table")
         for name in values:
             if name not in readers:
-                near = "".join(f"; did you mean {each}?" for each in near_names(name, readers, 1))
+                near = "".join(f"; did you mean {each}?" for each in nearest_names(name, readers, 1))
                 raise place.error(f"unknown key {name!r}; allowed: {', '.join(readers)}{near}")
         return {name: readers[name](value, place.at(name)) for name, value in values.items()}
 
@@ -291,7 +291,7 @@ def _override(values: dict[str, Any], override: str) -> None:
     if not parents and last in CHOICES and isinstance(value_of(written), str):
         parents = ["estimator"]
     elif not parents and last not in Scenario.__dataclass_fields__:
-        parents = ["settings"] if near_names(last, (row.name for row in settings_table())) else []
+        parents = ["settings"] if nearest_names(last, (row.name for row in settings_table())) else []
     at = ""
     try:
         for parent, child in zip(parents, [*parents, last][1:], strict=True):

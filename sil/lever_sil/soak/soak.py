@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import BoolArray, FloatArray
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator
 from lever_cdkf.firmware.library import lib
+from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from lever_cdkf.report.series import runs
 from numpy.typing import NDArray
 
@@ -102,7 +102,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Result:
+class SoakResult:
     parts: list[Part]
     settled_memory: float
     """After the first flights [MiB]."""
@@ -134,7 +134,7 @@ class Result:
         return found
 
 
-def run(hours: float, seed: int, show: Show) -> Result:
+def run(hours: float, seed: int, show: Show) -> SoakResult:
     """Fly for so many hours, in flights of DURATION."""
     estimator = Estimator(Config())
     count = max(1, round(hours * HOUR / DURATION))
@@ -151,7 +151,7 @@ def run(hours: float, seed: int, show: Show) -> Result:
             parts.append(Part(sums, memory()))
             sums = Sums()
         show(number + 1, count)
-    return Result(parts, settled, kinds)
+    return SoakResult(parts, settled, kinds)
 
 
 def _fly(scenario: Scenario, estimator: Estimator, number: int) -> Sums:

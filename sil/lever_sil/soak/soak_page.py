@@ -5,12 +5,12 @@ from __future__ import annotations
 import html
 
 import numpy as np
+from lever_cdkf.cli.tables import Row
 from lever_cdkf.report.figure import SERIES, Figure, axis, line
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table
-from lever_cdkf.tables import Row
 
-from .soak import QUANTITIES, Result
+from .soak import QUANTITIES, SoakResult
 
 _SEES = """\
 <p>NEES is e' P<sup>-1</sup> e / 3 of the logarithms of the three parameters, of the time without a flag. Their errors
@@ -22,7 +22,7 @@ others too small.</p>
 """
 
 
-def build(result: Result, rows: list[Row], verdict: str) -> str:
+def build(result: SoakResult, rows: list[Row], verdict: str) -> str:
     """Return the whole page; `rows` are the hours, as printed."""
     page = Page("A day without a reset", "One instance of the firmware, hour by hour.", "lever soak")
     page.section("hours", "Hours", "Consistency by the hour", page.figure("chart", _chart(result), ""), _SEES)
@@ -35,7 +35,7 @@ def _text(cell: object) -> str:
     return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
 
 
-def _chart(result: Result) -> Figure:
+def _chart(result: SoakResult) -> Figure:
     hours = np.arange(1.0, len(result.parts) + 1.0)
     rows = [part.sums.row() for part in result.parts]
     titles = ("NEES, NIS [1]", "within 2σ [%]", "memory [MiB]")

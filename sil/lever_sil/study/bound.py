@@ -24,7 +24,7 @@ is at rest first, and runs that leave the model's bounds are drawn again (matche
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from .data import PARAMETERS, Batch

@@ -14,8 +14,8 @@ from functools import partial
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.errors import LeverError
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from .data import PARAMETERS, Batch, Estimates, Estimator, Knowledge, Model

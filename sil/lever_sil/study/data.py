@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 STATES, PARAMETERS, OUTPUTS = 2, 3, 2

@@ -11,8 +11,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.models.detrend import DAMPING
+from lever_cdkf.numeric.arrays import Array
 
 from .data import OUTPUTS, Batch
 

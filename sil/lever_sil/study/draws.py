@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 
 from ..plants.excitation import Noise
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from itertools import chain
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from .data import PARAMETERS, Batch

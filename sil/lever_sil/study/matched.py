@@ -18,11 +18,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.config import setting, settings_table
 from lever_cdkf.models.lever import Lever
 from lever_cdkf.models.linear import LinearBlackBox, LinearPhysical
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.numeric.arrays import Array
+from lever_cdkf.text.units import GRAVITY
 
 from .data import OUTPUTS, PARAMETERS, STATES, Batch, Knowledge, Model, Truth, rest_angle
 from .draws import excitation, streams

@@ -14,12 +14,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.cli.tables import Cell, Row
 from lever_cdkf.firmware.config import setting, settings_table
 from lever_cdkf.firmware.native import Config, run_samples
 from lever_cdkf.models.lever import Lever
-from lever_cdkf.tables import Cell, Row
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.numeric.arrays import Array
+from lever_cdkf.text.units import GRAVITY
 
 from ..plants.excitation import Noise, Rotor
 from .draws import streams

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware import quantities
+from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.results.trace import Trace
 
 from ..run import in_process

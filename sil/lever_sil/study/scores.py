@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
-from lever_cdkf.statistics import chi_square_band
+from lever_cdkf.numeric.arrays import Array
+from lever_cdkf.numeric.quantiles import chi_square_band
 
 from .data import Batch, Estimates
 

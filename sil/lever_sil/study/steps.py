@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.config import settings_table
 from lever_cdkf.models.lever import Lever
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.numeric.arrays import Array
+from lever_cdkf.text.units import GRAVITY
 
 from .data import OUTPUTS, PARAMETERS, Batch, Truth
 from .detrended import detrended

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from .data import PARAMETERS, STATES, Batch

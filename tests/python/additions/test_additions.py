@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from lever_cdkf.files import LIBRARY_DIR, native_file
+from lever_cdkf.runtime.files import LIBRARY_DIR, native_file
 
 SCENARIO = """
 title = "A seesaw"
@@ -41,7 +41,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 
 from .linear_plant import LinearTruth, System
 
@@ -159,8 +159,8 @@ import sys
 sys.meta_path[:] = [each for each in sys.meta_path if "Editable" not in type(each).__name__ + type(each).__module__
                     and "Redirecting" not in type(each).__name__]
 sys.path[:0] = sys.argv.pop(1).split(os.pathsep)
-from lever_cdkf import cli
-sys.exit(cli.main())
+from lever_cdkf.cli.main import main
+sys.exit(main())
 """
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.arrays import ComplexArray
 from lever_cdkf.models.transfer import Transfer
+from lever_cdkf.numeric.arrays import ComplexArray
 from lever_sil.aircraft import stability
 from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.aircraft.tabulated import Tabulated

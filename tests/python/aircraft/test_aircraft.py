@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.aircraft import aircraft, stability
 from lever_sil.aircraft.aircraft import Aircraft, Coupled, Helicopter
 from lever_sil.aircraft.flight import Flight

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.aircraft import AircraftResponse, Stability
 from lever_cdkf.firmware.native import Config, Estimator
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.aircraft import aircraft, stability
 from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.aircraft.flight import Flight

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.errors import LeverError
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.aircraft import aircraft, stability, state_space
 from lever_sil.aircraft.aircraft import Aircraft, Coupled, Helicopter
 from lever_sil.aircraft.response_table import known_response

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet
 import pytest
-from lever_cdkf import cli
 from lever_cdkf.can import codec
+from lever_cdkf.can.estimator_frames import EstimatorFrames, read_samples
 from lever_cdkf.can.logs import Recording
-from lever_cdkf.can.traffic import Traffic, read_samples
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.aircraft import AircraftResponse, read_response
 from lever_cdkf.firmware.native import Config, Estimator
 from lever_cdkf.firmware.settings_file import format_config
@@ -35,7 +35,7 @@ CHANGED = "uh60_like,gearing=0.5,warning=30"
 def out(session: Session, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("watched") / "out"
     arguments = ["--aircraft", CHANGED, "--format", "csv,mf4,mcap,parquet", "-o", str(folder)]
-    assert cli.main(["replay", str(session.log), *arguments]) == 0
+    assert main(["replay", str(session.log), *arguments]) == 0
     return folder
 
 
@@ -43,7 +43,7 @@ def test_the_margin_is_that_of_the_estimator_with_the_same_samples(session: Sess
     """But for its steps on the bus."""
     estimator = Estimator(Config())
     estimator.watch(response("uh60_like", ["gearing=0.5", "warning=30"]))
-    samples = read_samples(Traffic(Recording([session.log])))
+    samples = read_samples(EstimatorFrames(Recording([session.log])))
     for row in zip(*(samples[name] for name in ("time_us", "theta", "theta_dot", "tau_m", "z_ddot")), strict=True):
         time_us, *values = (float(value) for value in row)
         estimator.update(int(time_us), *(None if np.isnan(value) else value for value in values))
@@ -65,7 +65,7 @@ def test_every_file_has_it(out: Path) -> None:
     assert "With uh60_like, gearing 0.5, the gain margin to collective bounce was least at" in summary["verdict"]
     assert set(pyarrow.parquet.read_table(out / "trace.parquet")["bounce"].to_pylist()) >= {"warning"}
     assert "figure-stability" in figures(read(out / "report.html"))
-    assert cli.main(["replay", str(out / "trace.parquet"), "-o", str(out.parent / "again")]) == 0
+    assert main(["replay", str(out / "trace.parquet"), "-o", str(out.parent / "again")]) == 0
 
 
 @pytest.fixture(scope="module")
@@ -74,12 +74,12 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("flown")
     cancelled = ("estimator.mitigation='cancellation'", "duration=8 s", "pilot.c_p=30 N s/m", "limits={}")
     overrides = [part for each in cancelled for part in ("--set", each)]
-    assert cli.main(["sim", "bounce", *overrides, "-o", str(folder / "sim")]) == 0
+    assert main(["sim", "bounce", *overrides, "-o", str(folder / "sim")]) == 0
     watched = ["--aircraft", "uh60_like,gearing=0.5"]
     settings = folder / "flown.settings"
     settings.write_text(format_config(scenario.load("bounce", list(cancelled)).config))
     log = str(folder / "sim" / "bus.log")
-    assert cli.main(["replay", log, *watched, "--settings", str(settings), "-o", str(folder / "replay")]) == 0
+    assert main(["replay", log, *watched, "--settings", str(settings), "-o", str(folder / "replay")]) == 0
     return folder
 
 
@@ -125,7 +125,7 @@ def test_a_simulation_knows_the_true_margin(flown: Path) -> None:
 
 
 def test_without_an_aircraft_there_is_none(session: Session, tmp_path: Path) -> None:
-    assert cli.main(["replay", str(session.log), "-o", str(tmp_path)]) == 0
+    assert main(["replay", str(session.log), "-o", str(tmp_path)]) == 0
     assert json.loads((tmp_path / "summary.json").read_text())["stability"] is None
     assert "bounce" not in (tmp_path / "trace.csv").read_text().partition("\n")[0]
 
@@ -148,14 +148,14 @@ def test_a_view_of_the_bus_shows_it(out: Path) -> None:
 
 def test_a_file_holds_the_response(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "uh60.response"
-    assert cli.main(["aircraft", "uh60_like", "gearing=0.5", "alarm=1", "-o", str(path)]) == 0
+    assert main(["aircraft", "uh60_like", "gearing=0.5", "alarm=1", "-o", str(path)]) == 0
     written, kept = response("uh60_like", ["gearing=0.5", "alarm=1"]).pointer, read_response(str(path)).pointer
     assert written.count == kept.count == 24
     for name in ("frequency", "real", "imaginary"):
         assert list(getattr(kept, name)) == pytest.approx(list(getattr(written, name)), rel=1e-5)
     for name in ("gain_sigma", "phase_sigma", "warning", "alarm"):
         assert getattr(kept, name) == pytest.approx(getattr(written, name))
-    assert cli.main(["aircraft"]) == 0
+    assert main(["aircraft"]) == 0
     assert "puma_like" in capsys.readouterr().out
 
 

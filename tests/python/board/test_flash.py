@@ -13,8 +13,8 @@ import zlib
 from pathlib import Path
 
 import pytest
-from lever_cdkf import cli
 from lever_cdkf.board.firmware_image import FLASH, flash_contents
+from lever_cdkf.cli.main import main
 from lever_cdkf.errors import LeverError
 from python.conftest import Refused
 
@@ -142,7 +142,7 @@ def test_without_an_image_it_says_how_to_build_one(
 def test_openocd_is_told(options: list[str], arguments: list[str], image: Path, stand_in: Path) -> None:
     called = install(stand_in, "openocd", "** Verified OK **", 0)
     install(stand_in, "pyocd", "not this one", 1)
-    assert cli.main(["flash", str(image), *options]) == 0
+    assert main(["flash", str(image), *options]) == 0
     program = f"program {{{image}}} verify reset exit 0x08000000"
     assert called.read_text().split("\n") == [*arguments, "-f", "target/stm32f4x.cfg", "-c", program]
 
@@ -157,14 +157,14 @@ def test_openocd_is_told(options: list[str], arguments: list[str], image: Path, 
 )
 def test_pyocd_is_told(options: list[str], arguments: list[str], image: Path, stand_in: Path) -> None:
     called = install(stand_in, "pyocd", "", 0)
-    assert cli.main(["flash", str(image), *options]) == 0
+    assert main(["flash", str(image), *options]) == 0
     expected = ["load", "--no-wait", "--target", "stm32f405rgtx", *arguments, str(image)]
     assert called.read_text().split("\n") == expected
 
 
 def test_dry_run_runs_nothing(image: Path, stand_in: Path, capsys: pytest.CaptureFixture[str]) -> None:
     called = install(stand_in, "openocd", "", 0)
-    assert cli.main(["flash", str(image), "--dry-run"]) == 0
+    assert main(["flash", str(image), "--dry-run"]) == 0
     assert "interface/stlink.cfg" in capsys.readouterr().out
     assert not called.exists()
 
@@ -200,7 +200,7 @@ def test_failure_says_what_to_do(
     tool: str, says: str, advice: str, image: Path, stand_in: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     install(stand_in, tool, says, 1)
-    assert cli.main(["flash", str(image)]) == 2
+    assert main(["flash", str(image)]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert lines[:-1] == says.splitlines(), "what the tool says is shown"
     assert advice in lines[-1]
@@ -208,7 +208,7 @@ def test_failure_says_what_to_do(
 
 @pytest.mark.requires("openocd")
 def test_real_openocd_finds_no_probe(image: Path) -> None:
-    command = [sys.executable, "-m", "lever_cdkf.cli", "flash", str(image), "--tool", "openocd"]
+    command = [sys.executable, "-m", "lever_cdkf.cli.main", "flash", str(image), "--tool", "openocd"]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     assert result.returncode == 2
     assert "lever: error: no probe answers openocd" in result.stderr

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
-from lever_sil.bounce import bounce_page, campaign, conditions
+from lever_cdkf.cli.main import main
+from lever_sil.acceptance.result import Limit
+from lever_sil.bounce import bounce_page, conditions, run_conditions
 from lever_sil.bounce.conditions import CONDITIONS, Condition
 from lever_sil.bounce.flights import FIVE
 from lever_sil.bounce.measure import FIGURES, Measured
-from lever_sil.judged.result import Limit
 from python.conftest import Refused
 
 
 def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = ["--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]
-    status = cli.main(["bounce", "--quick", "--seeds", "1", *files])
+    status = main(["bounce", "--quick", "--seeds", "1", *files])
     printed = capsys.readouterr().out
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
     written = (tmp_path / "bounce.html").read_text(encoding="utf-8")
@@ -40,9 +40,9 @@ def test_results_are_of_all_aircraft_and_pilots(monkeypatch: pytest.MonkeyPatch)
         return Measured({"alarm lead": float(len(craft) + 10 * seed)})
 
     row = Condition("made_up", "title", measured, (Limit("alarm lead", least=10.0, over="worst"),))
-    monkeypatch.setattr(campaign, "CONDITIONS", {"made_up": row})
+    monkeypatch.setattr(run_conditions, "CONDITIONS", {"made_up": row})
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
-    (result,) = campaign.run([row], 2, lambda *_: None)
+    (result,) = run_conditions.run([row], 2, lambda *_: None)
     assert sorted(result.values["alarm lead"].tolist()) == [9.0, 9.0, 10.0, 19.0, 19.0, 20.0]
     assert not result.ok
     assert result.worst_run("alarm lead") == "uh60_like, pilot 0"
@@ -53,14 +53,14 @@ def test_results_are_of_all_aircraft_and_pilots(monkeypatch: pytest.MonkeyPatch)
 def test_pilots_may_fly_the_aircraft_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     limit = Limit("alarm lead", least=0.0, over="worst")
     row = Condition("made_up", "title", lambda *_: Measured({"alarm lead": 1.0}), (limit,), aircraft=FIVE, in_turn=True)
-    monkeypatch.setattr(campaign, "CONDITIONS", {"made_up": row})
+    monkeypatch.setattr(run_conditions, "CONDITIONS", {"made_up": row})
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
-    (result,) = campaign.run([row], 7, lambda *_: None)
+    (result,) = run_conditions.run([row], 7, lambda *_: None)
     assert result.runs == [f"{craft}, pilot {seed}" for seed, craft in enumerate((*FIVE, *FIVE[:2]))]
 
 
 def test_the_list_names_every_condition(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["bounce", "--list"]) == 0
+    assert main(["bounce", "--list"]) == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in conditions.CONDITIONS)
 

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.bounce import detectors
 from lever_sil.bounce.detectors import RATE, Watched
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.library import lib
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.aircraft import aircraft, stability
 from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.bounce import flights, measure, pilots

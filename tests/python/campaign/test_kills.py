@@ -34,7 +34,7 @@ def until(condition: Callable[[], bool], process: subprocess.Popen[str]) -> None
 
 def begin(*arguments: str | Path, start_new_session: bool = False) -> subprocess.Popen[str]:
     """`lever campaign`, started."""
-    command = [sys.executable, "-m", "lever_cdkf.cli", "campaign", *map(str, arguments)]
+    command = [sys.executable, "-m", "lever_cdkf.cli.main", "campaign", *map(str, arguments)]
     pipe = subprocess.PIPE
     return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=start_new_session)
 

@@ -13,7 +13,7 @@ from cantools.database.can import Database, Message, Signal
 from e2e.p02 import e2e_p02_check
 from lever_cdkf.can import codec
 from lever_cdkf.errors import CodecError
-from lever_cdkf.files import native_file
+from lever_cdkf.runtime.files import native_file
 
 FRAMING = {"crc", "counter"}
 DATABASE = cantools.database.load_file(native_file("lever.dbc"))

@@ -10,8 +10,8 @@ import pytest
 from lever_cdkf.can import bulk, codec, fields
 from lever_cdkf.can.bulk import Feeder
 from lever_cdkf.can.bus import LeverBus
+from lever_cdkf.can.estimator_frames import EstimatorFrames, read_samples
 from lever_cdkf.can.logs import LogError, Recording
-from lever_cdkf.can.traffic import Traffic, read_samples
 from lever_cdkf.firmware.estimator import Estimator, Health, run_samples
 from python.conftest import Session
 
@@ -69,7 +69,7 @@ def one_by_one(log: Path, session: Session) -> tuple[list[tuple[int, bytes]], He
 def test_answers_are_those_of_the_bus(at_once: int, spoilt_log: Path, session: Session) -> None:
     expected, health = one_by_one(spoilt_log, session)
     feeder = Feeder(Estimator(session.config), at_once)
-    traffic = Traffic(Recording([spoilt_log]), "lever")
+    traffic = EstimatorFrames(Recording([spoilt_log]), "lever")
     fed = np.concatenate([out.copy() for frames in traffic.chunks() for out, _ in feeder.feed(frames)])
     answers = fed[fed["flags"] == bulk.ANSWER]
     assert [(int(frame["id"]), frame["data"].tobytes()) for frame in answers] == expected
@@ -86,7 +86,7 @@ def test_answers_are_those_of_the_bus(at_once: int, spoilt_log: Path, session: S
 def test_rows_hold_what_belongs_to_a_sample(session: Session) -> None:
     """Against the trace of the simulation, which is made of its own record of what it sent and got."""
     feeder = Feeder(Estimator(session.config), 4096)
-    pieces = [rows for frames in Traffic(Recording([session.log])).chunks() for _, rows in feeder.feed(frames)]
+    pieces = [rows for frames in EstimatorFrames(Recording([session.log])).chunks() for _, rows in feeder.feed(frames)]
     rows = np.concatenate([*pieces, feeder.flush()])
     assert len(feeder.flush()) == 0
     trace = session.result.trace
@@ -105,14 +105,14 @@ def test_rows_hold_what_belongs_to_a_sample(session: Session) -> None:
 
 
 def test_samples_are_those_that_were_sent(session: Session, spoilt_log: Path) -> None:
-    samples = read_samples(Traffic(Recording([session.log])))
+    samples = read_samples(EstimatorFrames(Recording([session.log])))
     trace = session.result.trace
     np.testing.assert_array_equal(samples["time_us"], np.rint(trace["time_s"] * 1e6))
     for name, column in (("theta", "_rad"), ("theta_dot", "_rad_s"), ("z_ddot", "_m_s2"), ("tau_m", "_N_m")):
         np.testing.assert_array_equal(samples[name], trace[f"{name}_measured{column}"])
     estimates = run_samples(session.config, samples)
     np.testing.assert_allclose(estimates["theta"][2000:], trace["theta_estimate_rad"][2000:], atol=1.01e-4)
-    some = read_samples(Traffic(Recording([spoilt_log]), "lever"))
+    some = read_samples(EstimatorFrames(Recording([spoilt_log]), "lever"))
     assert 5500 < len(some["time_us"]) < 6000
     assert np.isnan(some["theta"]).sum() > 20
 
@@ -122,8 +122,8 @@ def test_which_bus_has_the_samples_must_be_clear(session: Session, tmp_path: Pat
     text = session.log.read_text()
     both.write_text(text + text.replace(" lever ", " can1 "))
     with pytest.raises(LogError, match="choose with --channel: lever, can1"):
-        list(Traffic(Recording([both])).chunks())
-    traffic = Traffic(Recording([both]), "can1")
+        list(EstimatorFrames(Recording([both])).chunks())
+    traffic = EstimatorFrames(Recording([both]), "can1")
     assert sum(map(len, traffic.chunks())) == len(session.lines) == traffic.others["other_buses"]
     with pytest.raises(LogError, match=r"no sample .* on bus can7"):
-        list(Traffic(Recording([both]), "can7").chunks())
+        list(EstimatorFrames(Recording([both]), "can7").chunks())

@@ -9,15 +9,15 @@ import can
 import cantools.database
 import numpy as np
 import pytest
-from lever_cdkf import cli
 from lever_cdkf.can import buses, codec, identifiers, logs
+from lever_cdkf.cli.main import Parser, main
 from lever_cdkf.errors import LeverError
 
 SHIFTS = (["--id-offset", "0x40"], ["--id-base", "0x18FF0000"])
 
 
 def choose(arguments: Sequence[str]) -> None:
-    parser = cli.Parser()
+    parser = Parser()
     identifiers.add_identifier_options(parser)
     identifiers.use(parser.parse_args(arguments))
 
@@ -84,7 +84,7 @@ def test_a_log_and_a_bus_are_read_as_if_they_had_those_of_the_dbc(arguments: lis
 def test_the_shifted_database_differs_in_identifiers_alone(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["dbc", "--text", *arguments]) == 0
+    assert main(["dbc", "--text", *arguments]) == 0
     shifted = cantools.database.load_string(capsys.readouterr().out, "dbc")
     assert isinstance(shifted, cantools.database.can.Database)
     for ours, theirs in zip(codec.database().messages, shifted.messages, strict=True):

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
 from lever_cdkf.can import codec
-from lever_cdkf.files import native_file
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.library import enum_names
+from lever_cdkf.runtime.files import native_file
 from numpy.typing import NDArray
 
 FRAMES = 40
@@ -44,7 +44,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def wireshark(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Return an environment whose configuration of Wireshark has the profile lever."""
     folder = tmp_path_factory.mktemp("config")
-    assert cli.main(["dbc", "--wireshark", str(folder / "wireshark/profiles/lever")]) == 0
+    assert main(["dbc", "--wireshark", str(folder / "wireshark/profiles/lever")]) == 0
     return os.environ | {"XDG_CONFIG_HOME": str(folder)}
 
 

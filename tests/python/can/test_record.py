@@ -18,9 +18,9 @@ from typing import ClassVar
 import can
 import pytest
 from can.interfaces import BACKENDS
-from lever_cdkf import cli
 from lever_cdkf.can.recorder import Recorder
-from lever_cdkf.provenance import sha256
+from lever_cdkf.cli.main import main
+from lever_cdkf.runtime.provenance import sha256
 from processes import PATIENCE, full_disk
 from python.conftest import Refused, Session
 
@@ -61,7 +61,7 @@ def failure() -> None:
 
 def record(path: Path, frames: list[can.Message], end: Callable[[], None] = ctrl_c) -> int:
     Line.frames, Line.end = deque(frames), staticmethod(end)
-    return cli.main(["record", "--interface", "kvaser", "--channel", "x", "-o", str(path)])
+    return main(["record", "--interface", "kvaser", "--channel", "x", "-o", str(path)])
 
 
 def messages(session: Session, count: int) -> list[can.Message]:
@@ -87,7 +87,7 @@ def test_the_log_has_every_frame_and_can_be_replayed(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.log", "a.log.provenance.json"]
     origin = json.loads((tmp_path / "a.log.provenance.json").read_text())
     assert origin["outputs"] == {"a.log": sha256(log)}
-    assert cli.main(["replay", str(log)]) == 0
+    assert main(["replay", str(log)]) == 0
     assert "reproduced bit for bit" in capsys.readouterr().out
 
 
@@ -168,10 +168,10 @@ def test_ctrl_c_completes_the_log(tmp_path: Path) -> None:
     """In a process, on python-can's virtual bus."""
     program = (
         "import sys\n"
-        "from lever_cdkf import cli\n"
+        "from lever_cdkf.cli.main import main\n"
         "from lever_cdkf.can import buses\n"
         "buses._IN_PROCESS = ()\n"
-        "sys.exit(cli.main(['record', '--interface=virtual', '--channel=x', '-o', 'a.log']))\n"
+        "sys.exit(main(['record', '--interface=virtual', '--channel=x', '-o', 'a.log']))\n"
     )
     command = [sys.executable, "-c", program]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:

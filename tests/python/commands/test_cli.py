@@ -13,17 +13,17 @@ from typing import Any
 
 import can
 import pytest
-from lever_cdkf import cli
 from lever_cdkf.can import codec
+from lever_cdkf.cli.main import COMMANDS, GROUPS, _parser, main
 from lever_cdkf.commands import dbc, settings
 from lever_cdkf.errors import LeverError
-from lever_cdkf.files import native_file
 from lever_cdkf.firmware.config import CHOICES
 from lever_cdkf.firmware.native import settings_table
+from lever_cdkf.runtime.files import native_file
 from processes import LEVER as LEVER_SCRIPT
 from python.conftest import Refused
 
-LEVER = [sys.executable, "-m", "lever_cdkf.cli"]
+LEVER = [sys.executable, "-m", "lever_cdkf.cli.main"]
 
 
 def entry(name: str, load: Any) -> Any:
@@ -40,7 +40,7 @@ def entry(name: str, load: Any) -> Any:
 def commands(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Return the commands that `lever` finds: those of host_tools, and what a test adds."""
     found = [entry("settings", lambda: settings), entry("dbc", lambda: dbc)]
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found if group == cli.COMMANDS else [])
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found if group == COMMANDS else [])
     return found
 
 
@@ -59,11 +59,11 @@ def command_that(raises: BaseException) -> Any:
 def test_help_of_every_installed_command(installed: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert installed
     with pytest.raises(LeverError, match="invalid choice"):
-        cli._parser().parse_args(["none"])
-    names = cli._parser()._subparsers._group_actions[0].choices  # type: ignore[union-attr]
+        _parser().parse_args(["none"])
+    names = _parser()._subparsers._group_actions[0].choices  # type: ignore[union-attr]
     assert {"settings", "dbc"} <= set(names or ())
     for arguments in ([], *([name] for name in names or ())):
-        assert cli.main([*arguments, "--help"]) == 0
+        assert main([*arguments, "--help"]) == 0
         out, err = capsys.readouterr()
         assert out.startswith(f"usage: {' '.join(['lever', *arguments])} ")
         assert any(words in out for words in ("example", "a first session", "The same as"))
@@ -74,11 +74,11 @@ def test_help_of_every_installed_command(installed: str, capsys: pytest.CaptureF
 def test_help_lists_commands_by_purpose(installed: str, capsys: pytest.CaptureFixture[str]) -> None:
     """Each command of this project has one; those of other packages come last."""
     assert installed
-    names = cli._parser()._subparsers._group_actions[0].choices  # type: ignore[union-attr]
-    assert sorted(names or ()) == sorted(name for group in cli.GROUPS.values() for name in group)
-    assert cli.main(["--help"]) == 0
+    names = _parser()._subparsers._group_actions[0].choices  # type: ignore[union-attr]
+    assert sorted(names or ()) == sorted(name for group in GROUPS.values() for name in group)
+    assert main(["--help"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    at = [lines.index(f"    {title}") for title in cli.GROUPS]
+    at = [lines.index(f"    {title}") for title in GROUPS]
     assert at == sorted(at)
     assert "    other packages" not in lines
 
@@ -87,7 +87,7 @@ def test_help_lists_commands_by_purpose(installed: str, capsys: pytest.CaptureFi
 def test_commands_of_other_packages_come_last(commands: list[Any], capsys: pytest.CaptureFixture[str]) -> None:
     act = SimpleNamespace(add_parser=lambda subparsers: subparsers.add_parser("act", help="do it"), run=None)
     commands.append(entry("act", lambda: act))
-    cli.main(["--help"])
+    main(["--help"])
     lines = [line.split()[0] for line in capsys.readouterr().out.splitlines() if line.startswith("    ")]
     assert lines.index("other") == lines.index("act") - 1 > lines.index("settings")
 
@@ -95,7 +95,7 @@ def test_commands_of_other_packages_come_last(commands: list[Any], capsys: pytes
 @pytest.mark.usefixtures("commands")
 def test_version(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.metadata, "version", {"lever-cdkf": "1.2.3"}.__getitem__)
-    assert cli.main(["--version"]) == 0
+    assert main(["--version"]) == 0
     assert capsys.readouterr().out == "lever 1.2.3\n"
 
 
@@ -105,7 +105,7 @@ def test_version(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyP
 @pytest.mark.usefixtures("commands")
 def test_settings_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "a.json"
-    assert cli.main(["settings", "--json", str(path)]) == 0
+    assert main(["settings", "--json", str(path)]) == 0
     lines = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
     rows = {row["name"]: row for row in json.loads(path.read_text())["settings"]}
     for setting in settings_table():
@@ -127,9 +127,9 @@ def test_settings_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
 @pytest.mark.usefixtures("commands")
 def test_settings_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, rows = tmp_path / "my.settings", tmp_path / "a.json"
-    assert cli.main(["settings", "--set", "m_p=3", "--set", "preload=fixed", "--set", "m_p = 3.5"]) == 0
+    assert main(["settings", "--set", "m_p=3", "--set", "preload=fixed", "--set", "m_p = 3.5"]) == 0
     path.write_text(capsys.readouterr().out)
-    assert cli.main(["settings", "--settings", str(path), "--set", "c_p=50", "--json", str(rows)]) == 0
+    assert main(["settings", "--settings", str(path), "--set", "c_p=50", "--json", str(rows)]) == 0
     lines = [line.split("  #")[0].rstrip() for line in capsys.readouterr().out.splitlines()]
     assert {"m_p = 3.5", "preload = fixed", "c_p = 50.0", "model = lever"} <= set(lines)
     assert len(lines) == len(CHOICES) + len(settings_table())
@@ -153,18 +153,18 @@ def test_one_syntax_of_settings_in_all_commands(
         ["sim", "steady", *options, "--settings"],
         ["sim", "steady", "--set", "settings.theta_noise=2 mrad", *options[2:], "--settings"],
     ):
-        assert cli.main(arguments) == 0
+        assert main(arguments) == 0
         lines = {line.split("  #")[0].rstrip() for line in capsys.readouterr().out.splitlines()}
         assert expected | {"preload = fixed"} <= lines, arguments
     for arguments in (["replay", "none.log"], ["tune", "none.log"], ["sim", "steady"], ["settings"]):
-        assert cli.main([*arguments, "--set", "theta_noise=2 mm"]) == 2
+        assert main([*arguments, "--set", "theta_noise=2 mm"]) == 2
         assert "'2 mm' has unit 'mm'; allowed: rad, mrad, urad, deg" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("commands")
 def test_dbc_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "a.json"
-    assert cli.main(["dbc", "--json", str(path)]) == 0
+    assert main(["dbc", "--json", str(path)]) == 0
     lines = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
     assert (
         "LEVER_SAMPLE theta 16 16 True 0.0001 rad -3.2767 3.2767 Lever angle from the floor. -32768 not_available"
@@ -183,7 +183,7 @@ def test_dbc_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.usefixtures("commands")
 def test_dbc_path(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["dbc", "--path"]) == 0
+    assert main(["dbc", "--path"]) == 0
     assert capsys.readouterr().out == f"{native_file('lever.dbc')}\n"
 
 
@@ -226,14 +226,14 @@ def test_errors_of_commands(
     error: BaseException, status: int, text: str, commands: list[Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
     commands.append(entry("act", lambda: command_that(error)))
-    assert cli.main(["act"]) == status
+    assert main(["act"]) == status
     assert capsys.readouterr().err == text
 
 
 def test_a_defect_is_not_hidden(commands: list[Any]) -> None:
     commands.append(entry("act", lambda: command_that(ZeroDivisionError("defect"))))
     with pytest.raises(ZeroDivisionError):
-        cli.main(["act"])
+        main(["act"])
 
 
 def test_reader_that_has_enough(installed: str) -> None:
@@ -270,8 +270,8 @@ def test_own_run_and_shared_run(commands: list[Any]) -> None:
         subparsers.add_parser("two").set_defaults(run=lambda _args: 22)
 
     commands.append(entry("both", lambda: SimpleNamespace(add_parser=add_parser, run=lambda _args: 11)))
-    assert cli.main(["one"]) == 11
-    assert cli.main(["two"]) == 22
+    assert main(["one"]) == 11
+    assert main(["two"]) == 22
 
 
 @pytest.mark.usefixtures("commands")
@@ -280,15 +280,15 @@ def test_broken_plug_in_does_not_take_the_others_along(commands: list[Any], caps
         raise ImportError("No module named 'plot'")
 
     commands.append(entry("broken", broken))
-    assert cli.main(["dbc", "--path"]) == 0
+    assert main(["dbc", "--path"]) == 0
     assert capsys.readouterr().err == "lever: warning: no commands from somewhere.broken: No module named 'plot'\n"
 
 
 def test_help_loads_nothing_heavy() -> None:
     code = (
         "import sys, importlib.metadata\n"
-        "from lever_cdkf import cli\n"
-        "cli.main(['--help'])\n"
+        "from lever_cdkf.cli.main import main\n"
+        "main(['--help'])\n"
         "known = {'numpy', 'cffi', 'cantools', 'can', 'rich', 'scipy', 'plotly', 'textual', 'tornado'}\n"
         "heavy = known & set(sys.modules)\n"
         "print(' '.join(sorted(heavy)), file=sys.stderr, end='')\n"

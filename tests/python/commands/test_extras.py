@@ -11,8 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from lever_cdkf import cli
-from lever_cdkf.extras import PACKAGES
+from lever_cdkf.cli.main import main
+from lever_cdkf.runtime.extras import PACKAGES
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -36,8 +36,8 @@ sys.meta_path.insert(0, Blocker())
 """
 _STATUSES = """
 import json, sys
-from lever_cdkf import cli
-statuses = [cli.main(arguments) for arguments in json.loads(sys.argv[1])]
+from lever_cdkf.cli.main import main
+statuses = [main(arguments) for arguments in json.loads(sys.argv[1])]
 print(*statuses)
 """
 
@@ -117,7 +117,7 @@ def test_a_missing_extra(
     monkeypatch.chdir(tmp_path)
     for name in ("session.mf4", "flight.parquet", "flight.mat"):
         (tmp_path / name).write_text("a log")
-    assert cli.main(arguments.split()) == 2
+    assert main(arguments.split()) == 2
     names = " and ".join(needed or PACKAGES[extra])
     assert capsys.readouterr() == (
         "",
@@ -171,8 +171,8 @@ def test_importing_python_can_loads_nothing_of_this_package(without: Without) ->
 
 def test_commands_do_not_load_asammdf_for_nothing(without: Without) -> None:
     code = (
-        "import sys; from lever_cdkf import cli\n"
-        "cli.main(['sim', 'steady', '--set', 'duration=1 s', '--set', 'limits={}'])\n"
+        "import sys; from lever_cdkf.cli.main import main\n"
+        "main(['sim', 'steady', '--set', 'duration=1 s', '--set', 'limits={}'])\n"
         "print('can' in sys.modules, 'asammdf' in sys.modules)"
     )
     assert without()(code).stdout.splitlines()[-1] == "True False"

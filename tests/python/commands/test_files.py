@@ -10,10 +10,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from lever_cdkf import files, progress
+from lever_cdkf.cli import progress
+from lever_cdkf.cli.tables import Tables, print_tables
 from lever_cdkf.errors import LeverError
-from lever_cdkf.files import check_writable, write_texts
-from lever_cdkf.tables import Tables, print_tables
+from lever_cdkf.runtime import files
+from lever_cdkf.runtime.files import check_writable, write_texts
 from processes import full_disk
 from python.conftest import Refused
 

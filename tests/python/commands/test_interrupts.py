@@ -14,10 +14,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from lever_cdkf import cli, interrupts
+from lever_cdkf.cli.main import main
+from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
-from lever_cdkf.files import Outputs
-from lever_cdkf.progress import Progress
+from lever_cdkf.runtime import interrupts
+from lever_cdkf.runtime.files import Outputs
 
 Act = Callable[[Callable[[], None]], int]
 LINE = "lever: interrupted\n"
@@ -51,7 +52,7 @@ def act(monkeypatch: pytest.MonkeyPatch) -> Act:
         module = SimpleNamespace(add_parser=lambda parsers: parsers.add_parser("act"), run=status)
         entry: Any = SimpleNamespace(value="here", load=lambda: module)
         monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [entry])
-        return cli.main(["act"])
+        return main(["act"])
 
     return command
 
@@ -114,7 +115,7 @@ def test_it_is_heard_while_the_command_is_still_being_read() -> None:
         "    def find_spec(self, name, path=None, target=None):\n"
         "        if name == 'argparse': signal.raise_signal(signal.SIGINT)\n"
         "sys.meta_path.insert(0, Finder())\n"
-        "from lever_cdkf.start import main\n"
+        "from lever_cdkf.cli.entry_point import main\n"
         "sys.exit(main())\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
@@ -125,7 +126,7 @@ def test_it_changes_nothing_once_all_is_done() -> None:
     """Ctrl-C while Python ends: not a death by the signal (-2)."""
     program = (
         "import signal, sys\n"
-        "from lever_cdkf.start import main\n"
+        "from lever_cdkf.cli.entry_point import main\n"
         "class Last:\n"
         "    def __del__(self): signal.raise_signal(signal.SIGINT)\n"
         "sys.last = Last()\n"
@@ -142,12 +143,12 @@ def test_it_stays_ignored_where_it_is() -> None:
     program = (
         "import signal\n"
         "signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
-        "from lever_cdkf import start\n"
+        "from lever_cdkf.cli import entry_point\n"
         "from lever_cdkf.commands import dbc\n"
         "run = dbc.run\n"
         "dbc.run = lambda args: (signal.raise_signal(signal.SIGINT), run(args))[1]\n"
         "import sys; sys.argv = ['lever', 'dbc', '--path']\n"
-        "sys.exit(start.main())\n"
+        "sys.exit(entry_point.main())\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -155,7 +156,7 @@ def test_it_stays_ignored_where_it_is() -> None:
 
 def test_the_script_starts_where_it_is_caught() -> None:
     (script,) = importlib.metadata.entry_points(group="console_scripts", name="lever")
-    assert script.value == "lever_cdkf.start:main"
+    assert script.value == "lever_cdkf.cli.entry_point:main"
 
 
 def test_worker_processes_leave_it_to_their_parent_from_the_start() -> None:

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_sil.commands import sim
 from lever_sil.plants import excitation, trajectories
 from lever_sil.scenarios import scenario
@@ -21,7 +21,7 @@ def test_every_kind_and_every_key_is_described(root: Path) -> None:
 
 
 def test_help_shows_a_line_for_each_file(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["sim", "--help"]) == 0
+    assert main(["sim", "--help"]) == 0
     shown = capsys.readouterr().out
     for file in (
         "bus.log",

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import pytest
 import readmes
-from lever_cdkf import cli
-from lever_cdkf.help_text import HelpFormatter
-from lever_cdkf.layout import command_lines, wrapped
-from lever_cdkf.tables import Row, print_tables
+from lever_cdkf.cli.help_text import HelpFormatter
+from lever_cdkf.cli.layout import command_lines, wrapped
+from lever_cdkf.cli.main import main
+from lever_cdkf.cli.tables import Row, print_tables
 from processes import LEVER
 
 Shown = Callable[..., str]
@@ -53,7 +53,7 @@ def shown(installed: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytes
 
     def run(*arguments: str, width: int = 80) -> str:
         monkeypatch.setenv("COLUMNS", str(width))
-        assert cli.main(arguments) in (0, 1)
+        assert main(arguments) in (0, 1)
         return capsys.readouterr().out
 
     return run

@@ -11,14 +11,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import Config
-from lever_sil.envelope import campaign, conditions, envelope_page, firmware, rules
-from lever_sil.envelope.condition import ClosedLoop, Condition
+from lever_sil.acceptance import table
+from lever_sil.acceptance.result import Limit
+from lever_sil.batch import firmware
+from lever_sil.batch.firmware import ClosedLoop
+from lever_sil.batch.motions import Motion
+from lever_sil.envelope import conditions, envelope_page, rules, run_conditions
+from lever_sil.envelope.condition import Condition
 from lever_sil.envelope.measure import fault_mask
-from lever_sil.envelope.motions import Motion
-from lever_sil.judged import table
-from lever_sil.judged.result import Limit
 from python.conftest import Refused
 
 QUICK = {
@@ -31,7 +33,7 @@ QUICK = {
 def test_the_reduced_table_holds(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], record_property: Callable[[str, object], None]
 ) -> None:
-    status = cli.main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
+    status = main(["envelope", "--quick", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     printed = capsys.readouterr().out
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
     written = (tmp_path / "envelope.html").read_text(encoding="utf-8")
@@ -72,9 +74,9 @@ def test_a_run_is_the_same_whoever_is_simulated_beside_it(monkeypatch: pytest.Mo
         Condition("wander", "", Motion(duration=3.0, wander=3.0), start=1.0),
         Condition("steady", "", Motion(duration=3.0, friction=0.1), start=1.0),
     ]
-    together = campaign.run(rows, {}, 3, lambda *_: None)
-    monkeypatch.setattr(campaign, "LANE_SECONDS", 6.0)
-    apart = campaign.run(rows, {}, 3, lambda *_: None)
+    together = run_conditions.run(rows, {}, 3, lambda *_: None)
+    monkeypatch.setattr(run_conditions, "LANE_SECONDS", 6.0)
+    apart = run_conditions.run(rows, {}, 3, lambda *_: None)
     for left, right in zip(together, apart, strict=True):
         assert left.condition is right.condition
         assert left.runs == right.runs == ["seed 0", "seed 1", "seed 2"]
@@ -85,7 +87,7 @@ def test_a_run_is_the_same_whoever_is_simulated_beside_it(monkeypatch: pytest.Mo
 
 def test_every_row_of_the_rules_is_measured() -> None:
     """All figures are numbers; times may be infinite."""
-    results = campaign.run(list(rules.RULES.values()), {}, 1, lambda *_: None)
+    results = run_conditions.run(list(rules.RULES.values()), {}, 1, lambda *_: None)
     for result in results:
         assert result.problem == ""
         assert not any(np.isnan(values).any() for values in result.values.values())
@@ -110,7 +112,7 @@ def test_the_firmware_dithers_the_lever_while_samples_are_lost(whole: bool) -> N
 
 @pytest.mark.usefixtures("short")
 def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["envelope", "--seeds", "2", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]) == 1
+    assert main(["envelope", "--seeds", "2", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]) == 1
     rows = {row["name"]: row for row in json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]}
     assert {name: row["ok"] for name, row in rows.items()} == {"missed": False, "unknown": False, "reported": True}
     assert rows["unknown"]["measured"] == {"f_n rms [%]": None}
@@ -124,7 +126,7 @@ def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 def test_a_figure_shows_on_which_side_of_its_limit_it_is() -> None:
     limits = (Limit("f_n largest", most=1.0), Limit("f_n largest", most=2.0, over="worst"))
     condition = Condition("steady", "", limits=limits)
-    result = campaign.Result(condition, dict.fromkeys(condition.figures, np.array([0.5, 1.0004])))
+    result = run_conditions.EnvelopeResult(condition, dict.fromkeys(condition.figures, np.array([0.5, 1.0004])))
     (line,) = table.lines([result])
     assert (line["all runs"], line["median"], line["p90"], line["worst"]) == ("1.0004", "0.75", "1", "1")
 
@@ -141,7 +143,7 @@ def test_a_figure_shows_on_which_side_of_its_limit_it_is() -> None:
     ],
 )
 def test_nine_runs_of_ten_are_no_worse_than_p90(figure: str, values: Sequence[float], expected: float) -> None:
-    result = campaign.Result(Condition("", ""), {figure: np.array(values, np.float64)})
+    result = run_conditions.EnvelopeResult(Condition("", ""), {figure: np.array(values, np.float64)})
     np.testing.assert_equal(result.of(Limit(figure, over="p90")), expected)
 
 
@@ -155,7 +157,7 @@ def test_estimates_that_are_not_finite_keep_no_limit(monkeypatch: pytest.MonkeyP
         return replace(track, value={name: np.full_like(column, np.nan) for name, column in track.value.items()})
 
     monkeypatch.setattr(firmware, "estimates", spoilt)
-    results = campaign.run([row], {}, 2, lambda *_: None)
+    results = run_conditions.run([row], {}, 2, lambda *_: None)
     assert not results[0].ok
     assert table.rows(results)[0]["measured"] == {"f_n rms [%]": None, "f_n covered [%]": 0.0}
     assert 'id="chart-steady"' in envelope_page.build(results, 2)
@@ -177,7 +179,7 @@ def test_bad_input_is_one_line(arguments: list[str], words: tuple[str, ...], ref
 
 
 def test_the_list_names_every_condition(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["envelope", "--list"]) == 0
+    assert main(["envelope", "--list"]) == 0
     printed = capsys.readouterr().out
     assert all(name in printed for name in (*conditions.CONDITIONS, *rules.RULES))
 
@@ -193,6 +195,6 @@ def test_the_list_names_every_condition(capsys: pytest.CaptureFixture[str]) -> N
 )
 def test_a_table_of_its_own_runs_where_it_is_named(tmp_path: Path, named: Sequence[str], ran: list[str]) -> None:
     only = ("--only", *named) if named else ()
-    cli.main(["envelope", *only, "--seeds", "1", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
+    main(["envelope", *only, "--seeds", "1", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     rows = json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]
     assert [row["name"] for row in rows] == ran

@@ -9,14 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.firmware.config import Config, settings_table
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator, feed
-from lever_sil.envelope import firmware, measure, motions, pilots, plant
-from lever_sil.envelope.firmware import RESPONSE_STRIDE, Feedthrough, Track
+from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
+from lever_sil.batch import firmware, motions, pilots, plant
+from lever_sil.batch.firmware import RESPONSE_STRIDE, Feedthrough, Track
+from lever_sil.batch.motions import Motion, Recording
+from lever_sil.batch.sensors import NOISE, Fault, Sensors, lost, measured
+from lever_sil.envelope import measure
 from lever_sil.envelope.measure import FIGURES, Outcome, fault_mask
-from lever_sil.envelope.motions import Motion, Recording
-from lever_sil.envelope.sensors import NOISE, Fault, Sensors, lost, measured
 from lever_sil.plants import lever_plant as sil_plant
 from lever_sil.plants.truth import Conditions
 from numpy.typing import NDArray
@@ -63,7 +64,7 @@ def test_friction_takes_its_share_of_each_half_swing() -> None:
     hardware = plant.Hardware(damping=0.0)
     given = motions.lanes(replace(QUIET, duration=2.0, base=0.0, dither=0.0, friction=0.05), range(1))
     given = replace(given, c_p=np.zeros((1, 1)), trim=np.full((1, 1), 0.3), hardware=hardware)
-    lanes = plant.Plant(given)
+    lanes = plant.BatchPlant(given)
     lanes.theta[0] += 0.01
     lanes.move(0, 1500)
     angle = lanes.theta[1:1501, 0] - 0.3

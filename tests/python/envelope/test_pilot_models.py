@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from lever_sil.envelope import campaign
+from lever_sil.envelope import run_conditions
 from lever_sil.envelope.conditions import CONDITIONS
 
 
 @pytest.mark.parametrize("name", ["two_dof_seat", "mayo_random_hand"])
 def test_the_model_of_such_a_pilot_needs_no_flag(name: str) -> None:
-    (result,) = campaign.run([CONDITIONS[name]], {}, 2, lambda *_: None)
+    (result,) = run_conditions.run([CONDITIONS[name]], {}, 2, lambda *_: None)
     assert all(limit.holds(result.of(limit)) for limit in CONDITIONS[name].limits)

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import lever_cdkf
 import pytest
-from lever_cdkf import cli
-from lever_cdkf import provenance as origin
+from lever_cdkf.cli.main import main
 from lever_cdkf.commands.signal_options import input_files
 from lever_cdkf.errors import LeverError
-from lever_cdkf.files import LIBRARY_DIR, native_file, shared_library
-from lever_cdkf.provenance import provenance, with_provenance
+from lever_cdkf.runtime import provenance as origin
+from lever_cdkf.runtime.files import LIBRARY_DIR, native_file, shared_library
+from lever_cdkf.runtime.provenance import provenance, with_provenance
 from python.conftest import Session
 
 
@@ -99,7 +99,7 @@ def test_the_revision_is_that_of_the_tree_of_the_package_and_of_no_other(
 
 
 def test_rows_in_json_have_it(session: Session, tmp_path: Path) -> None:
-    assert cli.main(["replay", str(session.log), "--json", str(tmp_path / "rows.json")]) == 0
+    assert main(["replay", str(session.log), "--json", str(tmp_path / "rows.json")]) == 0
     provided = json.loads((tmp_path / "rows.json").read_text())["provenance"]
     assert provided["version"] == origin.version()
     assert provided["inputs"] == {str(session.log): origin.sha256(session.log)}

@@ -17,12 +17,12 @@ import pandas as pd
 import polars as pl
 import pytest
 from asammdf import MDF
-from lever_cdkf import cli
+from lever_cdkf.cli.formats import FORMATS
+from lever_cdkf.cli.main import main
 from lever_cdkf.errors import LeverError
 from lever_cdkf.exports.signal_files import SignalFiles
-from lever_cdkf.formats import FORMATS
-from lever_cdkf.provenance import provenance
 from lever_cdkf.results.trace import Trace
+from lever_cdkf.runtime.provenance import provenance
 from mcap.reader import make_reader
 from processes import full_disk
 from pyarrow import parquet
@@ -66,7 +66,7 @@ def replayed(session: Session, root: Path, tmp_path_factory: pytest.TempPathFact
             file.write(f"({at // 1_000_000}.{at % 1_000_000:06d}){rest}\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-        assert cli.main(["replay", str(log), "-o", str(out), *ALL]) == 0
+        assert main(["replay", str(log), "-o", str(out), *ALL]) == 0
     dbc = cantools.database.load_file(root / "firmware/can/lever.dbc")
     return Replayed(log, out, pd.read_csv(out / "trace.csv"), dbc)
 
@@ -75,7 +75,7 @@ def replayed(session: Session, root: Path, tmp_path_factory: pytest.TempPathFact
 def simulation(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("simulation") / "out"
     short = ("--set", "duration=3 s", "--set", "limits={}")
-    assert cli.main(["sim", "steady", *short, "--out", str(out), *ALL]) == 0
+    assert main(["sim", "steady", *short, "--out", str(out), *ALL]) == 0
     return out
 
 
@@ -132,7 +132,7 @@ def test_a_mode_that_is_not_known_yet_is_said_so_in_mf4(session: Session, tmp_pa
     health = [line for line in session.lines if " 214#" in line]
     late = tmp_path / "late.log"
     late.write_text("\n".join(line for line in session.lines if line not in health[: len(health) // 2]) + "\n")
-    assert cli.main(["replay", str(late), "-o", str(tmp_path / "out"), "--format", "mf4"]) == 0
+    assert main(["replay", str(late), "-o", str(tmp_path / "out"), "--format", "mf4"]) == 0
     with MDF(tmp_path / "out/signals.mf4") as file:
         modes = file.get("mode_recorded").samples
     assert (modes[0], modes[-1]) == (b"not known", b"run")
@@ -263,7 +263,7 @@ def digest(path: Path) -> str:
 
 def test_only_what_is_asked_for_is_written(session: Session, tmp_path: Path) -> None:
     for formats, files in (("parquet", {"trace.parquet"}), ("mcap,csv", {"signals.mcap", "trace.csv"})):
-        assert cli.main(["replay", str(session.log), "-o", str(tmp_path), "--format", formats]) == 0
+        assert main(["replay", str(session.log), "-o", str(tmp_path), "--format", formats]) == 0
         assert {path.name for path in tmp_path.iterdir()} == {"bus.log", "report.html", "summary.json", *files}
 
 
@@ -277,7 +277,7 @@ def test_what_is_wrong_with_formats_is_one_line(session: Session, refused: Refus
 
 def test_an_input_is_not_written_over(session: Session, refused: Refused, tmp_path: Path) -> None:
     for name in ("trace.parquet", "signals.mf4"):
-        assert cli.main(["replay", str(session.log), "-o", str(tmp_path), *ALL]) == 0
+        assert main(["replay", str(session.log), "-o", str(tmp_path), *ALL]) == 0
         before = (tmp_path / name).read_bytes()
         assert "it is an input" in refused("replay", tmp_path / name, "-o", tmp_path, *ALL)
         assert (tmp_path / name).read_bytes() == before
@@ -303,7 +303,7 @@ def test_a_full_disk_is_an_error_that_names_the_file(name: str, tmp_path: Path) 
 
 def test_another_model_has_its_own_columns(tmp_path: Path) -> None:
     session = simulated("linear_black_box", tmp_path / "sim")
-    assert cli.main(["replay", str(session.log), "-o", str(tmp_path / "out"), "--model", "linear_black_box", *ALL]) == 0
+    assert main(["replay", str(session.log), "-o", str(tmp_path / "out"), "--model", "linear_black_box", *ALL]) == 0
     with MDF(tmp_path / "out/signals.mf4") as file:
         assert file.get("a21_estimate").unit == "1/s^2"
     assert parquet.read_schema(tmp_path / "out/trace.parquet").field("a22_sigma_1_s").metadata[b"unit"] == b"1/s"

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.library import lib
-from lever_sil.envelope import firmware
-from lever_sil.envelope.condition import ClosedLoop
-from lever_sil.envelope.motions import PERIOD, STRIDE
+from lever_sil.batch import firmware
+from lever_sil.batch.firmware import ClosedLoop
+from lever_sil.batch.motions import PERIOD, STRIDE
 from lever_sil.faults import bus, faults_page, judge, matrix, readings, table
 from lever_sil.faults.flight import Pilot, Record
 from lever_sil.faults.rows import KNOWN, MOTION, ROWS, TIME
@@ -110,7 +110,7 @@ def test_longest() -> None:
 def test_the_command_writes_its_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "rows.json"
     only = ["--only", "theta_stuck", "foreign_load", "--seeds", "1"]
-    assert cli.main(["faults", *only, "--json", str(file), "--out", str(tmp_path)]) == 0
+    assert main(["faults", *only, "--json", str(file), "--out", str(tmp_path)]) == 0
     content = json.loads(file.read_text(encoding="utf-8"))
     assert [row["name"] for row in content["rows"]] == ["theta_stuck", "foreign_load"]
     assert content["count"] == 2
@@ -122,8 +122,8 @@ def test_the_command_writes_its_rows(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def test_a_fault_that_is_not_met_is_named_and_explained(pilot: Pilot) -> None:
     """A demand that no firmware keeps: a flag for what cannot be seen."""
-    row = replace(ROWS["clock_wraps"], must=judge.Must(("CLOCK",), 1))
-    result = matrix.Result(row, list(matrix.flights([row], pilot)))
+    row = replace(ROWS["clock_wraps"], requirement=judge.Requirement(("CLOCK",), 1))
+    result = matrix.RowResult(row, list(matrix.flights([row], pilot)))
     assert result.broken == ["to flag"]
     assert table.unexpected([result]) == ["clock_wraps"]
     assert "<strong" in faults_page.build([result], 1)
@@ -138,28 +138,28 @@ def spoilt(right: Record, **columns: tuple[slice, float]) -> Record:
 
 
 FIRST, AFTER, LAST = slice(0, 1), slice(round(TIME[1] / PERIOD / STRIDE), None), slice(-5, None)
-BROKEN: dict[str, tuple[judge.Must, Callable[[Record], Record]]] = {
-    "not finite": (judge.Must(), lambda right: spoilt(right, theta=(FIRST, math.nan))),
-    "unanswered": (judge.Must(), lambda right: replace(right, unanswered=1)),
+BROKEN: dict[str, tuple[judge.Requirement, Callable[[Record], Record]]] = {
+    "not finite": (judge.Requirement(), lambda right: spoilt(right, theta=(FIRST, math.nan))),
+    "unanswered": (judge.Requirement(), lambda right: replace(right, unanswered=1)),
     "torque": (
-        judge.Must(),
+        judge.Requirement(),
         lambda right: replace(right, asked=2.001 * (right.asked == right.asked.max())),
     ),
-    "torque rms": (judge.Must(), lambda right: replace(right, asked=np.full_like(right.asked, 1.001))),
-    "torque left": (judge.Must(torque_ends=0.06), lambda right: right),
-    "estimates changed": (judge.Must(unaffected=True), lambda right: spoilt(right, theta=(LAST, 1.001))),
-    "to flag after": (judge.Must(after=("CLOCK",)), lambda right: right),
-    "mode run": (judge.Must(mode=("init",)), lambda right: right),
-    "silent": (judge.Must(), lambda right: spoilt(right, natural_frequency=(AFTER, 1.5))),
-    "error after": (judge.Must(), lambda right: spoilt(right, natural_frequency=(LAST, 3.0))),
+    "torque rms": (judge.Requirement(), lambda right: replace(right, asked=np.full_like(right.asked, 1.001))),
+    "torque left": (judge.Requirement(torque_ends=0.06), lambda right: right),
+    "estimates changed": (judge.Requirement(unaffected=True), lambda right: spoilt(right, theta=(LAST, 1.001))),
+    "to flag after": (judge.Requirement(after=("CLOCK",)), lambda right: right),
+    "mode run": (judge.Requirement(mode=("init",)), lambda right: right),
+    "silent": (judge.Requirement(), lambda right: spoilt(right, natural_frequency=(AFTER, 1.5))),
+    "error after": (judge.Requirement(), lambda right: spoilt(right, natural_frequency=(LAST, 3.0))),
 }
 
 
 @pytest.mark.parametrize("what", BROKEN)
 def test_a_demand_that_is_not_kept_is_named(what: str, right: Record, pilot: Pilot) -> None:
-    must, spoil = BROKEN[what]
-    assert judge.judge(judge.Must(unaffected=True), right, right, pilot.truth, TIME).broken == []
-    broken = judge.judge(must, spoil(right), right, pilot.truth, TIME).broken
+    requirement, spoil = BROKEN[what]
+    assert judge.judge(judge.Requirement(unaffected=True), right, right, pilot.truth, TIME).broken == []
+    broken = judge.judge(requirement, spoil(right), right, pilot.truth, TIME).broken
     assert broken[0] == what
     assert set(broken) <= {what, "error after"}
 

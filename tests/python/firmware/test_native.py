@@ -16,9 +16,9 @@ import polars
 import pytest
 from lever_cdkf.can import codec
 from lever_cdkf.errors import LeverError, SettingsError
-from lever_cdkf.files import LIBRARY_DIR, native_file
 from lever_cdkf.firmware import native, quantities
 from lever_cdkf.firmware.native import Config, Estimator, lib
+from lever_cdkf.runtime.files import LIBRARY_DIR, native_file
 
 QUICK = Config(settings={"align_time": 0.05})
 DEFAULTS = {
@@ -280,7 +280,7 @@ def test_run_samples_takes_a_step_of_another_size_but_not_of_another_unit(step_u
 def test_a_library_that_cannot_be_loaded(tmp_path: Path) -> None:
     (tmp_path / "liblever_cdkf.so").write_text("not a library")
     environment = {**os.environ, LIBRARY_DIR: f"{tmp_path}{os.pathsep}{os.environ.get(LIBRARY_DIR, '')}"}
-    command = [sys.executable, "-m", "lever_cdkf.cli", "settings"]
+    command = [sys.executable, "-m", "lever_cdkf.cli.main", "settings"]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 2
     assert done.stdout == ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from python.fmu.importer import unpacked
 
 
@@ -13,8 +13,8 @@ from python.fmu.importer import unpacked
 def fmus(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with lever.fmu and pilot.fmu, with two seeds of the scenario demo."""
     folder = tmp_path_factory.mktemp("fmus")
-    assert cli.main(["fmu", "controller", "-o", str(folder / "lever.fmu")]) == 0
-    assert cli.main(["fmu", "pilot", "-o", str(folder / "pilot.fmu"), "--seeds", "2"]) == 0
+    assert main(["fmu", "controller", "-o", str(folder / "lever.fmu")]) == 0
+    assert main(["fmu", "pilot", "-o", str(folder / "pilot.fmu"), "--seeds", "2"]) == 0
     return folder
 
 
@@ -33,7 +33,7 @@ def pilot(fmus: Path) -> Path:
 @pytest.fixture(scope="session")
 def bus_fmu(fmus: Path) -> Path:
     """lever.fmu --bus."""
-    assert cli.main(["fmu", "controller", "--bus", "-o", str(fmus / "bus.fmu")]) == 0
+    assert main(["fmu", "controller", "--bus", "-o", str(fmus / "bus.fmu")]) == 0
     return fmus / "bus.fmu"
 
 

@@ -94,7 +94,7 @@ def test_ctrl_c_leaves_what_was_there(kind: str, tmp_path: Path) -> None:
     temporary.mkdir()
     compiler.write_text("#!/bin/sh\ntouch compiling\nexec sleep 600\n")
     compiler.chmod(0o755)
-    command = [sys.executable, "-m", "lever_cdkf.cli", "fmu", kind, "-o", str(out)]
+    command = [sys.executable, "-m", "lever_cdkf.cli.main", "fmu", kind, "-o", str(out)]
     environment = {**os.environ, "CC": str(compiler), "TMPDIR": str(temporary)}
     pipe = subprocess.PIPE
     process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment, start_new_session=True)

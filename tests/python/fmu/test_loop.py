@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_sil import fast
 from lever_sil.run import in_process
 from lever_sil.scenarios.scenario import Scenario, load
@@ -67,7 +67,7 @@ def test_other_pilots_too(name: str, controller: Path, tmp_path: Path) -> None:
     """The controller with the settings of the scenario as parameters."""
     scenario = load(name, ["duration=6 s"])
     fmu = tmp_path / "pilot.fmu"
-    assert cli.main(["fmu", "pilot", "-o", str(fmu), "--scenario", name, "--set", "duration=6 s"]) == 0
+    assert main(["fmu", "pilot", "-o", str(fmu), "--scenario", name, "--set", "duration=6 s"]) == 0
     own = Instance(controller, parameters=scenario.config.settings)
     assert compared(scenario, Loop(Instance(unpacked(fmu, tmp_path / "pilot")), own)) == []
 
@@ -81,10 +81,10 @@ def test_a_helicopter_with_mitigation_too(changed: list[str], tmp_path: Path) ->
     correction by itself needs commands as well, or it ends after a second."""
     changes = [text for each in ("duration=6 s", *changed) for text in ("--set", each)]
     scenario = load("bounce", changes[1::2])
-    assert cli.main(["fmu", "pilot", "-o", str(tmp_path / "p.fmu"), "--scenario", "bounce", *changes]) == 0
+    assert main(["fmu", "pilot", "-o", str(tmp_path / "p.fmu"), "--scenario", "bounce", *changes]) == 0
     own = [f"{name}={value}" for name, value in {**scenario.config.choices, **scenario.config.settings}.items()]
     options = [*(text for each in own for text in ("--set", each)), "--aircraft", "uh60_like,gearing=0.5"]
-    assert cli.main(["fmu", "controller", "-o", str(tmp_path / "c.fmu"), *options]) == 0
+    assert main(["fmu", "controller", "-o", str(tmp_path / "c.fmu"), *options]) == 0
     pilot, controller = (Instance(unpacked(tmp_path / f"{name}.fmu", tmp_path / name)) for name in "pc")
     assert compared(scenario, Loop(pilot, controller)) == []
     values = controller.get("gain_margin", "correction", "bounce_state")
@@ -96,10 +96,10 @@ def test_a_helicopter_with_mitigation_too(changed: list[str], tmp_path: Path) ->
 def test_aircraft_closes_the_loop_of_a_scenario_without_one(tmp_path: Path) -> None:
     """The cabin of the pilot answers to the lever, as in the scenario with that table."""
     sets = ("--scenario", "steady", "--set", "duration=2 s")
-    assert cli.main(["fmu", "pilot", "-o", str(tmp_path / "p.fmu"), *sets, "--aircraft", "uh60_like,gearing=0.4"]) == 0
+    assert main(["fmu", "pilot", "-o", str(tmp_path / "p.fmu"), *sets, "--aircraft", "uh60_like,gearing=0.4"]) == 0
     scenario = load("steady", ["duration=2 s", "aircraft.model=uh60_like", "aircraft.gearing=0.4 1"])
     recording = in_process.run(scenario)
-    assert cli.main(["fmu", "controller", "-o", str(tmp_path / "c.fmu")]) == 0
+    assert main(["fmu", "controller", "-o", str(tmp_path / "c.fmu")]) == 0
     pilot = Instance(unpacked(tmp_path / "p.fmu", tmp_path / "p"))
     loop = Loop(pilot, Instance(unpacked(tmp_path / "c.fmu", tmp_path / "c")))
     z_ddot = []

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 
 ROOT = Path(__file__).resolve().parents[3]
 FOLDER = Path(os.environ.get("LEVER_BUILD_DIR", ROOT / "build")) / "tests/oracle"

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import sympy
-from lever_cdkf.arrays import FloatArray
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.numeric.arrays import FloatArray
+from lever_cdkf.text.units import GRAVITY
 from lever_sil.plants.lever_plant import Lever
 from lever_sil.plants.truth import Body, Conditions, Truth
 

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.text.units import GRAVITY
 from lever_sil.plants.lever_plant import LeverTruth, Preload, Truth
 from python.plants.motion import LEVER, PERIOD, TRIM, body, columns, lagrange, moved
 from scipy import integrate

@@ -4,7 +4,7 @@ import cantools
 import numpy as np
 import pytest
 from lever_cdkf.can import codec
-from lever_cdkf.files import native_file
+from lever_cdkf.runtime.files import native_file
 from lever_sil.plants.sensors import Dropout, Fault, Scale, Sensor, Spikes, Stuck, missing
 from numpy.typing import NDArray
 from scipy import stats

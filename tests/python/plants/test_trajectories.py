@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.plants import trajectories
 from lever_sil.toml_tables import Place, ScenarioError
 

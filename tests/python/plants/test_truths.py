@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.plants import lever_plant
 from lever_sil.plants.hysteretic_plant import Hysteretic
 from lever_sil.plants.lever_plant import STOP_RATE, Lever, LeverTruth

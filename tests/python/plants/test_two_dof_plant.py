@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import FloatArray
 from lever_cdkf.models.transfer import BAND
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.plants.two_dof_plant import TRUNK_DAMPING, TRUNK_MASS, TRUNK_STIFFNESS, TwoDof
 from python.plants.motion import LEVER, PERIOD, TRIM, body, columns, lagrange
 from scipy import integrate

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from python.conftest import Session
 
 TAG = "<svg onload=alert(1)>"
@@ -26,7 +26,7 @@ def test_names_of_logs_and_buses_run_nothing(session: Session, tmp_path: Path) -
     log = tmp_path / f"{TAG}.log"
     lines = (line.split(" ", 2) for line in session.lines)
     log.write_text("".join(f"{time} {BUS} {frame}\n" for time, _, frame in lines))
-    assert cli.main(["replay", str(log), "-o", str(tmp_path / "out")]) == 0
+    assert main(["replay", str(log), "-o", str(tmp_path / "out")]) == 0
     page = shown((tmp_path / "out/report.html").read_text(encoding="utf-8"))
     assert TAG not in page
     assert BUS not in page
@@ -39,7 +39,7 @@ def test_names_of_columns_run_nothing(tmp_path: Path) -> None:
     motion = ((k / 100, math.sin(0.2 * k), math.sin(0.3 * k), 1.0 + 0.1 * math.sin(0.25 * k)) for k in range(1000))
     rows = "".join(",".join(f"{value:.6f}" for value in row) + "\n" for row in motion)
     table.write_text(f"Time,{TAG},Lever angle,Vertical acc.\ns,V,deg,g\n{rows}")
-    assert cli.main(["map", str(table), "-o", str(page)]) == 0
+    assert main(["map", str(table), "-o", str(page)]) == 0
     text = page.read_text(encoding="utf-8")
     assert TAG not in text
     assert "&lt;svg onload" in text

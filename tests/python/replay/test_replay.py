@@ -14,9 +14,9 @@ from typing import Any
 import can
 import numpy as np
 import pytest
-from lever_cdkf import cli
 from lever_cdkf.can import codec
-from lever_cdkf.formats import FORMATS
+from lever_cdkf.cli.formats import FORMATS
+from lever_cdkf.cli.main import main
 from lever_cdkf.replay import engine, reduction
 from lever_cdkf.replay.outputs import FILES
 from lever_cdkf.replay.summary import verdict
@@ -41,7 +41,7 @@ def _date() -> Iterator[None]:
 
 def replayed(out: Path, *arguments: str | Path) -> Summary:
     """`lever replay … -o out`, which must do; returns its summary."""
-    assert cli.main(["replay", *map(str, arguments), "-o", str(out)]) == 0
+    assert main(["replay", *map(str, arguments), "-o", str(out)]) == 0
     summary: Summary = json.loads((out / "summary.json").read_text())
     return summary
 
@@ -270,7 +270,7 @@ def test_a_sender_that_never_counts_fails_and_is_told_why(
                 name, fields = codec.decode(identifier, data)
                 content = {key: value for key, value in fields.items() if key not in ("crc", "counter")}
                 file.write(f"{time} {bus} {frame[:4]}{codec.encode(name, 3, content).hex().upper()}\n")
-    assert cli.main(["replay", str(log), "-o", str(out)]) == 1
+    assert main(["replay", str(log), "-o", str(out)]) == 1
     shown = capsys.readouterr()
     why = "no estimate was published: samples accepted: 1, frames refused: 11,998"
     assert shown.err == f"lever: replay: {why}\n"

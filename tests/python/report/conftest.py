@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from lever_cdkf.report import write_report
-from lever_sil.run.runner import Result, simulate
+from lever_sil.run.runner import SimulationResult, simulate
 from lever_sil.scenarios import scenario
 
 SCENARIO = """
@@ -42,20 +42,20 @@ share = "1 %"
 """
 
 
-def run(name: str, *overrides: str) -> Result:
+def run(name: str, *overrides: str) -> SimulationResult:
     """Return a scenario through the firmware in this process."""
     return simulate(scenario.load(name, overrides))
 
 
 @pytest.fixture(scope="session")
-def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
+def result(tmp_path_factory: pytest.TempPathFactory) -> SimulationResult:
     file = tmp_path_factory.mktemp("scenario") / "short.toml"
     file.write_text(SCENARIO)
     return run(str(file))
 
 
 @pytest.fixture(scope="session")
-def report(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(result: SimulationResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
     write_report(result.trace, result.summary, path)
     return path

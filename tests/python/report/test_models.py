@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from lever_cdkf.report import write_report
 from lever_sil.plants import pilots
-from lever_sil.run.runner import Result
+from lever_sil.run.runner import SimulationResult
 from scipy import signal
 
 from .conftest import run
 from .reading import Reader, figures, read, unpack
 
 
-def page_of(result: Result, folder: Path) -> Reader:
+def page_of(result: SimulationResult, folder: Path) -> Reader:
     write_report(result.trace, result.summary, folder / "report.html")
     return read(folder / "report.html")
 
 
 @pytest.fixture(scope="module")
-def black_box(tmp_path_factory: pytest.TempPathFactory) -> tuple[Result, Reader]:
+def black_box(tmp_path_factory: pytest.TempPathFactory) -> tuple[SimulationResult, Reader]:
     result = run("linear_black_box", "duration=6 s", "converged_after=1 s", "limits={}")
     return result, page_of(result, tmp_path_factory.mktemp("black_box"))
 
@@ -37,7 +37,9 @@ def curves(page: Reader, figure: str, name: str) -> list[np.ndarray]:
     return [unpack(trace["y"]) for trace in figures(page)[figure]["data"] if trace["name"] == name]
 
 
-def test_signed_parameters_are_shown_with_their_symbols_and_not_cut_at_zero(black_box: tuple[Result, Reader]) -> None:
+def test_signed_parameters_are_shown_with_their_symbols_and_not_cut_at_zero(
+    black_box: tuple[SimulationResult, Reader],
+) -> None:
     result, page = black_box
     rows = [row[0] for row in page.tables[1][1:]]
     assert rows[:3] == ["a21 minus stiffness", "a22 minus damping", "b21 answer to the floor"]
@@ -50,7 +52,7 @@ def test_signed_parameters_are_shown_with_their_symbols_and_not_cut_at_zero(blac
     assert "three numbers of any second-order system" in "".join(page.text)
 
 
-def test_the_answer_of_the_black_box_is_that_of_scipy(black_box: tuple[Result, Reader]) -> None:
+def test_the_answer_of_the_black_box_is_that_of_scipy(black_box: tuple[SimulationResult, Reader]) -> None:
     result, page = black_box
     heat = figures(page)["figure-map-estimate"]["data"][0]
     time, frequency, z = (unpack(heat[axis]) for axis in "xyz")
@@ -93,7 +95,9 @@ def test_every_model_of_the_truth_has_words(tmp_path: Path) -> None:
     assert "Residuals of the rate are coloured" in text
 
 
-def test_without_a_summary_the_model_is_that_of_the_columns(black_box: tuple[Result, Reader], tmp_path: Path) -> None:
+def test_without_a_summary_the_model_is_that_of_the_columns(
+    black_box: tuple[SimulationResult, Reader], tmp_path: Path
+) -> None:
     result, _ = black_box
     trace = {name: column for name, column in result.trace.items() if "_true" not in name}
     write_report(trace, None, tmp_path / "replay.html")

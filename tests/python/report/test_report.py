@@ -18,7 +18,7 @@ from lever_cdkf.firmware.native import enum_words
 from lever_cdkf.report import captions, summary_html, write_report
 from lever_cdkf.report.charts import tracking
 from lever_cdkf.report.run import COHERENT, Run
-from lever_sil.run.runner import Result
+from lever_sil.run.runner import SimulationResult
 
 from .reading import Reader, figures, first_number, read, unpack
 
@@ -83,7 +83,7 @@ def test_what_the_scenario_says_is_escaped(page: Reader, report: Path) -> None:
 # --- numbers ---------------------------------------------------------------------------------------------------------
 
 
-def test_tables_say_what_the_summary_says(page: Reader, result: Result) -> None:
+def test_tables_say_what_the_summary_says(page: Reader, result: SimulationResult) -> None:
     errors, run = page.tables[1], page.tables[2]
     rows = {row[0]: row[1:] for row in errors[1:]}
     assert list(rows) == list(ROWS.values())
@@ -110,7 +110,7 @@ def test_tables_say_what_the_summary_says(page: Reader, result: Result) -> None:
     )
 
 
-def test_the_answer_says_what_the_summary_says(page: Reader, result: Result) -> None:
+def test_the_answer_says_what_the_summary_says(page: Reader, result: SimulationResult) -> None:
     text, shown = "".join(page.text).replace("\u00a0", " "), {row[0]: row[1:3] for row in page.tables[0]}
     for key, name in ROWS.items():
         expected = asdict(result.summary.parameters[key])
@@ -133,7 +133,7 @@ def test_the_answer_says_what_the_summary_says(page: Reader, result: Result) -> 
     ],
 )
 def test_the_headline_is_good_only_if_errors_sigma_and_whiteness_are(
-    passed: bool, error: float, covered: float, white: bool, mood: str, result: Result
+    passed: bool, error: float, covered: float, white: bool, mood: str, result: SimulationResult
 ) -> None:
     summary = result.summary
     assert summary.whiteness is not None
@@ -144,7 +144,7 @@ def test_the_headline_is_good_only_if_errors_sigma_and_whiteness_are(
     assert f'class="verdict {mood}"' in summary_html.verdict(Run(result.trace, changed))
 
 
-def test_all_settings_are_shown(page: Reader, result: Result) -> None:
+def test_all_settings_are_shown(page: Reader, result: SimulationResult) -> None:
     shown = {row[0]: row[1] for row in page.tables[-1][1:]}
     settings = result.summary.estimator.settings
     assert list(shown) == list(settings)
@@ -158,12 +158,12 @@ def traces(page: Reader, figure: str, name: str) -> list[dict[str, Any]]:
     return [trace for trace in figures(page)[figure]["data"] if trace["name"] == name]
 
 
-def at(result: Result, x: np.ndarray, column: str) -> np.ndarray:
+def at(result: SimulationResult, x: np.ndarray, column: str) -> np.ndarray:
     """Return a column at the samples nearest to the times x."""
     return result.trace[column][np.searchsorted(result.trace["time_s"], x - 5e-4)]
 
 
-def test_parameter_curves_are_those_of_the_trace(page: Reader, result: Result) -> None:
+def test_parameter_curves_are_those_of_the_trace(page: Reader, result: SimulationResult) -> None:
     for row, (key, suffix) in enumerate((("m_p", "_kg"), ("c_p", "_N_s_m"), ("k_p", "_N_m"))):
         for name, kind in (("truth", "true"), ("estimate", "estimate")):
             trace = traces(page, "figure-parameters", name)[row]
@@ -177,7 +177,7 @@ def test_parameter_curves_are_those_of_the_trace(page: Reader, result: Result) -
         np.testing.assert_allclose((unpack(upper["y"]) - unpack(lower["y"]))[inside], width[inside], rtol=1e-4)
 
 
-def test_estimates_that_are_flagged_are_grey(result: Result) -> None:
+def test_estimates_that_are_flagged_are_grey(result: SimulationResult) -> None:
     """By a curve over that of all estimates, by the mask of the faults that say "do not trust this"; one of both says
     the value at the cursor."""
     faults = np.where(result.trace["time_s"] < 6.0, 0.0, 65536.0)  # calibration
@@ -196,7 +196,7 @@ def test_estimates_that_are_flagged_are_grey(result: Result) -> None:
     assert "hovertemplate" not in grey
 
 
-def test_the_margin_s_caption_says_how_far_it_was_from_the_truth(result: Result) -> None:
+def test_the_margin_s_caption_says_how_far_it_was_from_the_truth(result: SimulationResult) -> None:
     """By closed form: 2 dB too high with a σ of 1.5 dB, but for the first third, which is not counted, and a quarter
     of the rest, where it is 5 dB too low."""
     time = result.trace["time_s"]
@@ -211,7 +211,7 @@ def test_the_margin_s_caption_says_how_far_it_was_from_the_truth(result: Result)
     assert "held" not in captions.margin_caption(without)
 
 
-def test_the_headline_begins_with_the_warning(result: Result) -> None:
+def test_the_headline_begins_with_the_warning(result: SimulationResult) -> None:
     warned = replace(result.summary, warning="Do not trust the estimates: x (100 % of the time).", flagged_share=1.0)
     shown = summary_html.verdict(Run(result.trace, warned))
     assert shown.startswith('<p class="verdict bad"><strong>Do not trust the estimates: x (100\u00a0% of the time).')
@@ -227,7 +227,7 @@ def test_a_jump_is_drawn_where_it_is_and_marked(page: Reader) -> None:
     assert [shape["x0"] for shape in shapes] == [pytest.approx(8.0, abs=1.1e-3)]
 
 
-def test_maps_and_slices_are_the_response_of_the_parameters(page: Reader, result: Result) -> None:
+def test_maps_and_slices_are_the_response_of_the_parameters(page: Reader, result: SimulationResult) -> None:
     """Against the transfer function by scipy, from the columns of the trace and firmware/THEORY.md."""
     signal = pytest.importorskip("scipy.signal")
     s = result.summary.estimator.settings
@@ -257,7 +257,7 @@ def test_maps_and_slices_are_the_response_of_the_parameters(page: Reader, result
     assert span == pytest.approx([0.8 * np.nanmin(shown), 1.25 * np.nanmax(shown)], rel=0.01)
 
 
-def test_the_band_of_the_feedthrough_is_what_was_sent(page: Reader, result: Result) -> None:
+def test_the_band_of_the_feedthrough_is_what_was_sent(page: Reader, result: SimulationResult) -> None:
     """At the end of the run, at the frequencies that are sent: those of the slider's grid that are whole."""
     figure = figures(page)["figure-slices"]
     step = figure["choices"]["of"][-1]
@@ -278,7 +278,7 @@ def test_the_band_of_the_feedthrough_is_what_was_sent(page: Reader, result: Resu
     assert all(80 < int(share) <= 100 for share in held.groups())
 
 
-def test_coherence_is_that_of_the_measured_signals(page: Reader, result: Result) -> None:
+def test_coherence_is_that_of_the_measured_signals(page: Reader, result: SimulationResult) -> None:
     signal = pytest.importorskip("scipy.signal")
     (trace,) = traces(page, "figure-slices", "measured coherence")
     frequency, coherence = unpack(trace["x"]), unpack(trace["y"])
@@ -293,7 +293,7 @@ def test_coherence_is_that_of_the_measured_signals(page: Reader, result: Result)
     assert "complex error was" in "".join(page.text)
 
 
-def test_spectra_are_those_of_scipy_and_the_natural_frequency_is_marked(page: Reader, result: Result) -> None:
+def test_spectra_are_those_of_scipy_and_the_natural_frequency_is_marked(page: Reader, result: SimulationResult) -> None:
     signal = pytest.importorskip("scipy.signal")
     for name, column in (("base acceleration z̈", "z_ddot_true_m_s2"), ("motor torque τ<sub>m</sub>", "tau_m_true_N_m")):
         (trace,) = traces(page, "figure-spectra", name)
@@ -310,7 +310,7 @@ def test_spectra_are_those_of_scipy_and_the_natural_frequency_is_marked(page: Re
         assert 0.0 < high - low < 4.3
 
 
-def test_overview_of_the_motion_keeps_the_extremes(page: Reader, result: Result) -> None:
+def test_overview_of_the_motion_keeps_the_extremes(page: Reader, result: SimulationResult) -> None:
     trace = traces(page, "figure-motion", "truth")[0]
     theta = np.degrees(result.trace["theta_true_rad"])
     y = unpack(trace["y"])
@@ -330,7 +330,7 @@ def test_close_ups_show_one_stretch_at_a_time(page: Reader) -> None:
     assert colours == {"measured": "@measured", "truth": "@truth", "estimate": "@estimate"}
 
 
-def test_innovations_are_averages_and_the_band_knows_of_missing_outputs(page: Reader, result: Result) -> None:
+def test_innovations_are_averages_and_the_band_knows_of_missing_outputs(page: Reader, result: SimulationResult) -> None:
     trace = traces(page, "figure-innovations", "average over 0.25 s")[0]
     nis, theta = result.trace["nis"][4000:4250], result.trace["theta_measured_rad"][4000:4250]
     outputs = np.isfinite(theta).astype(int) + np.isfinite(result.trace["theta_dot_measured_rad_s"][4000:4250])
@@ -342,7 +342,7 @@ def test_innovations_are_averages_and_the_band_knows_of_missing_outputs(page: Re
     assert height[np.abs(x - 12.5) < 0.3].min() > height[np.abs(x - 5.0) < 0.3].max()  # one output: more scatter
 
 
-def test_the_correlation_of_the_residual_is_that_of_the_summary(page: Reader, result: Result) -> None:
+def test_the_correlation_of_the_residual_is_that_of_the_summary(page: Reader, result: SimulationResult) -> None:
     stated = result.summary.whiteness
     assert stated is not None
     bars = traces(page, "figure-whiteness", "residual of the rate")[0]
@@ -370,7 +370,7 @@ def test_health_names_what_happened_when_it_happened(page: Reader) -> None:
 
 
 @pytest.mark.parametrize("missing", ["estimate", "sigma", "measured", "true", "theta", "nis", "mode", "excitation"])
-def test_any_missing_column_costs_only_its_figure(missing: str, result: Result, tmp_path: Path) -> None:
+def test_any_missing_column_costs_only_its_figure(missing: str, result: SimulationResult, tmp_path: Path) -> None:
     trace = {name: column for name, column in result.trace.items() if missing not in name}
     write_report(trace, result.summary, tmp_path / "report.html")
     page = read(tmp_path / "report.html")
@@ -379,7 +379,7 @@ def test_any_missing_column_costs_only_its_figure(missing: str, result: Result, 
     assert page.ids("div") == list(figures(page))
 
 
-def test_a_run_that_got_no_answer_still_has_a_report(result: Result, tmp_path: Path) -> None:
+def test_a_run_that_got_no_answer_still_has_a_report(result: SimulationResult, tmp_path: Path) -> None:
     silent = ("estimate", "sigma", "nis", "mode", "faults", "lost", "corrupt", "late", "excitation")
     trace = {
         name: np.full(len(column), np.nan) if any(word in name for word in silent) else column
@@ -389,12 +389,12 @@ def test_a_run_that_got_no_answer_still_has_a_report(result: Result, tmp_path: P
     assert "figure-excitation" in figures(read(tmp_path / "report.html"))
 
 
-def test_two_samples_are_enough(result: Result, tmp_path: Path) -> None:
+def test_two_samples_are_enough(result: SimulationResult, tmp_path: Path) -> None:
     write_report({name: column[:2] for name, column in result.trace.items()}, None, tmp_path / "report.html")
     assert "excitation" in read(tmp_path / "report.html").ids("section")
 
 
-def test_a_path_that_cannot_be_written_is_one_line(result: Result, tmp_path: Path) -> None:
+def test_a_path_that_cannot_be_written_is_one_line(result: SimulationResult, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(LeverError, match="cannot write"):
         write_report(result.trace, result.summary, tmp_path / "file" / "report.html")
@@ -404,7 +404,7 @@ def test_a_path_that_cannot_be_written_is_one_line(result: Result, tmp_path: Pat
 # --- cost ------------------------------------------------------------------------------------------------------------
 
 
-def test_a_longer_run_makes_no_larger_page(report: Path, result: Result, tmp_path: Path) -> None:
+def test_a_longer_run_makes_no_larger_page(report: Path, result: SimulationResult, tmp_path: Path) -> None:
     """Ten minutes at 1 kHz."""
     count = len(result.trace["time_s"])
     times = 600_000 // count + 1

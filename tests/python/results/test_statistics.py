@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from lever_cdkf.statistics import chi_square_band, chi_square_quantile
+from lever_cdkf.numeric.quantiles import chi_square_band, chi_square_quantile
 from scipy import stats
 
 PROBABILITIES = (0.001, 0.025, 0.5, 0.95, 0.975, 0.999)

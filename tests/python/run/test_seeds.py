@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lever_cdkf import cli, interrupts
+from lever_cdkf.cli.main import main
 from lever_cdkf.results.nis import Nis
 from lever_cdkf.results.summary import Estimator, Firmware, Quality, Scenario, SimulationSummary, Truth
 from lever_cdkf.results.whiteness import Whiteness
+from lever_cdkf.runtime import interrupts
 from lever_sil.run import seeds
 from python.conftest import Refused, Run
 
@@ -100,7 +101,7 @@ def test_a_run_in_a_process_is_the_single_run(
     assert calls == [(1, 2, "steady, seed 5"), (2, 2, "steady, seed 6")]
     assert apart[0].parameters != apart[1].parameters
     sets = (f"--set={override}" for override in (*SHORT, "limits={}"))
-    assert cli.main(["sim", "steady", "--seed", "5", *sets, "--json", str(tmp_path / "single.json")]) == 0
+    assert main(["sim", "steady", "--seed", "5", *sets, "--json", str(tmp_path / "single.json")]) == 0
     single = next(iter(json.loads((tmp_path / "single.json").read_text()).values()))
     errors = {row["quantity"]: row["rms error [%]"] for row in single}
     assert errors == {key: entry.rms_percent for key, entry in apart[0].parameters.items()}

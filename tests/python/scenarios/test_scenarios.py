@@ -19,7 +19,7 @@ BROKEN = {
 
 
 @cache
-def result(name: str) -> runner.Result:
+def result(name: str) -> runner.SimulationResult:
     wanted = scenario.load(name, [f"duration={BROKEN[name]}"] if name in BROKEN else [])
     return runner.simulate(wanted)
 

@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from lever_cdkf import units
 from lever_cdkf.firmware.native import settings_table
+from lever_cdkf.text import units
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from pyarrow import parquet
 from python.report.reading import figures, read
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY
@@ -18,7 +18,7 @@ def test_a_row_for_each(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     logs = [str(folder / "flight.blf"), str(tmp_path / "empty.blf"), str(folder / "flight.log")]
     arguments = ["--each", "--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED, "--length", "15"]
     written = ["-o", str(tmp_path / "out"), "--json", str(tmp_path / "rows.json")]
-    assert cli.main(["replay", *logs, *arguments, *written]) == 1
+    assert main(["replay", *logs, *arguments, *written]) == 1
     assert f"lever: replay: {logs[1]}: " in capsys.readouterr().err
     rows = json.loads((tmp_path / "rows.json").read_text())["logs"]
     assert [row["log"] for row in rows] == ["flight.blf", "empty.blf", "flight.log"]
@@ -36,6 +36,6 @@ def test_a_row_for_each(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixt
 def test_tables_are_recordings_of_their_own(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = str(folder / "columns.csv")
     mapped = ["--map", "theta=Lever angle", "z_ddot=Vertical acc."]
-    assert cli.main(["replay", table, table, *mapped]) == 2
+    assert main(["replay", table, table, *mapped]) == 2
     assert "add --each" in capsys.readouterr().err
-    assert cli.main(["replay", table, table, "--each", *mapped]) == 0
+    assert main(["replay", table, table, "--each", *mapped]) == 0

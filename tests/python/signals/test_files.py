@@ -15,7 +15,7 @@ import pyarrow
 import pytest
 from asammdf import MDF
 from asammdf import Signal as Channel
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.signals.tables import is_table, read_table
 from pyarrow import parquet
 from python.conftest import Refused
@@ -198,11 +198,11 @@ def test_a_spreadsheets_encoding(columns: Columns, tmp_path: Path, capsys: pytes
     """What `lever map` proposes for a table in cp1252 is what `lever replay` takes; both say how they read it."""
     path = tmp_path / "flight.csv"
     as_csv(columns, path, "cp1252", ",")
-    assert cli.main(["map", str(path)]) == 0
+    assert main(["map", str(path)]) == 0
     said = capsys.readouterr().out
     assert "read as cp1252" in said
     command = next(line for line in said.splitlines() if line.startswith("lever replay"))
-    assert cli.main([*shlex.split(command)[1:], "-o", str(tmp_path / "out")]) == 0
+    assert main([*shlex.split(command)[1:], "-o", str(tmp_path / "out")]) == 0
     summary = json.loads((tmp_path / "out/summary.json").read_text())
     assert "read as cp1252" in summary["verdict"]
     assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)

@@ -20,9 +20,9 @@ import pytest
 from can.interfaces import BACKENDS
 from can.interfaces.virtual import VirtualBus
 from cantools.database.can import Database
-from lever_cdkf import cli
-from lever_cdkf.exit_status import INTERRUPTED
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import Config
+from lever_cdkf.runtime.exit_status import INTERRUPTED
 from lever_cdkf.signals.mapping import read_mapping
 from lever_cdkf.signals.online import Online
 from lever_cdkf.watch.mapped import MappedBusSource
@@ -201,7 +201,7 @@ def test_the_page_of_a_mapped_bus(folder: Path, port: int, monkeypatch: pytest.M
     monkeypatch.setitem(BACKENDS, "kvaser", (__name__, Wire.__name__))
     bus = ("--interface", "kvaser", "--channel", "wire", "--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED)
     with Page(port) as page:
-        assert cli.main(["live", *bus, "--port", str(port)]) == INTERRUPTED
+        assert main(["live", *bus, "--port", str(port)]) == INTERRUPTED
     assert page.first["title"] == "kvaser wire"
     assert not page.first["controls"]  # there is no estimator to be commanded
     assert page.frequency == pytest.approx(NATURAL_FREQUENCY, rel=0.05)
@@ -210,5 +210,5 @@ def test_the_page_of_a_mapped_bus(folder: Path, port: int, monkeypatch: pytest.M
 def test_the_page_of_a_mapped_log(folder: Path, port: int) -> None:
     with Page(port) as page:
         arguments = (str(folder / "flight.blf"), "--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED)
-        assert cli.main(["live", *arguments, "--port", str(port)]) == INTERRUPTED
+        assert main(["live", *arguments, "--port", str(port)]) == INTERRUPTED
     assert page.frequency == pytest.approx(NATURAL_FREQUENCY, rel=0.05)

@@ -9,7 +9,7 @@ from typing import Any
 import can
 import numpy as np
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.native import Config, enum_names, enum_words, run_samples
 from python.conftest import Refused
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY, Flight, as_decoded, write_log
@@ -19,7 +19,7 @@ COLUMNS = ("theta=Lever angle", "theta_dot=Lever rate", "z_ddot=Vertical acc.")
 
 def replayed(out: Path, log: Path, *arguments: str | Path) -> dict[str, Any]:
     """`lever replay log … -o out`, which must do; returns its summary."""
-    assert cli.main(["replay", str(log), *map(str, arguments), "-o", str(out)]) == 0
+    assert main(["replay", str(log), *map(str, arguments), "-o", str(out)]) == 0
     summary: dict[str, Any] = json.loads((out / "summary.json").read_text())
     return summary
 
@@ -252,7 +252,7 @@ def test_tune_takes_the_same(folder: Path, tmp_path: Path) -> None:
     arguments = ["--dbc", folder / "foreign.dbc", "--map", *MAPPED, "-o", tmp_path / "my.settings", "--length", "21"]
     arguments += ["--keep", "m_p_walk", "--keep", "c_p_walk", "--keep", "k_p_walk"]
     arguments += ["--page", tmp_path / "tune.html"]
-    assert cli.main(["tune", str(folder / "flight.blf"), *map(str, arguments)]) == 0
+    assert main(["tune", str(folder / "flight.blf"), *map(str, arguments)]) == 0
     assert "sample_period = 0.002" in (tmp_path / "my.settings").read_text()
     assert " lost)" not in (tmp_path / "tune.html").read_text()
 

@@ -13,7 +13,7 @@ from typing import ClassVar
 import can
 import pytest
 from can.interfaces import BACKENDS
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.signals.mapping import read_mapping
 from lever_cdkf.signals.online import Online
@@ -51,13 +51,13 @@ def shown_frequency(text: str) -> float:
 
 def test_a_log_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED]
-    assert cli.main(["monitor", "--once", str(folder / "flight.blf"), *arguments]) == 0
+    assert main(["monitor", "--once", str(folder / "flight.blf"), *arguments]) == 0
     assert shown_frequency(capsys.readouterr().out) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
 
 
 def test_the_margin_of_an_aircraft(folder: Path, capsys: pytest.CaptureFixture[str], refused: Refused) -> None:
     watched = ["monitor", "--once", str(folder / "flight.log"), "--aircraft", "uh60_like,gearing=0.5"]
-    assert cli.main([*watched, "--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED]) == 0
+    assert main([*watched, "--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED]) == 0
     assert re.search(r"bounce +clear: gain margin \d+\.\d ± \d\.\d dB", capsys.readouterr().out)
     assert "--aircraft goes with --map" in refused(*watched)
 
@@ -108,7 +108,7 @@ def test_a_recording_says_what_has_come_of_the_mapped_signals(
     recording = ["record", "--interface", "kvaser", "--channel", "x", "--json", str(tmp_path / "rows.json")]
     mapped = ["--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED]
     Line.frames = deque(frames[:16000])
-    assert cli.main([*recording, "-o", str(tmp_path / "flight.log"), *mapped]) == 0
+    assert main([*recording, "-o", str(tmp_path / "flight.log"), *mapped]) == 0
     rows = json.loads((tmp_path / "rows.json").read_text())
     assert [(row["input"], row["rate_hz"], row["missing"]) for row in rows["signals"]] == [
         ("theta", 500.0, 0),
@@ -120,7 +120,7 @@ def test_a_recording_says_what_has_come_of_the_mapped_signals(
         "AhrsAccel": 5000,
     }
     Line.frames = deque(frames[2:3])  # of another message: the log is complete all the same
-    assert cli.main([*recording, "-o", str(tmp_path / "other.log"), *mapped]) == 0
+    assert main([*recording, "-o", str(tmp_path / "other.log"), *mapped]) == 0
 
 
 def test_what_a_bus_needs(capsys: pytest.CaptureFixture[str], refused: Refused, folder: Path) -> None:

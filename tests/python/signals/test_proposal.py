@@ -12,8 +12,8 @@ import cantools.database
 import numpy as np
 import pytest
 from cantools.database.can import Database
-from lever_cdkf import cli
-from lever_cdkf.provenance import provenance
+from lever_cdkf.cli.main import main
+from lever_cdkf.runtime.provenance import provenance
 from lever_cdkf.signals import plots, proposal
 from lever_cdkf.signals.bus_signals import load_database
 from lever_cdkf.signals.recorded import Signal
@@ -53,7 +53,7 @@ def test_at_least_eight_of_ten_are_right(fleet: list[Aircraft], short: Flight, t
         folder.mkdir()
         log, dbc, truth = recorded(aircraft, 100 + index, short, folder)
         found = {}
-        if cli.main(["map", str(log), "--dbc", str(dbc), "--json", str(folder / "map.json")]) == 0:
+        if main(["map", str(log), "--dbc", str(dbc), "--json", str(folder / "map.json")]) == 0:
             rows = json.loads((folder / "map.json").read_text())["mapping"]
             found = {row["input"]: row["signal"] for row in rows}
         if found != truth:
@@ -64,7 +64,7 @@ def test_at_least_eight_of_ten_are_right(fleet: list[Aircraft], short: Flight, t
 def test_the_proposal_can_be_used_as_it_is(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, dbc = folder / "flight.blf", folder / "foreign.dbc"
     page, toml = tmp_path / "signals.html", tmp_path / "my.toml"
-    assert cli.main(["map", str(log), "--dbc", str(dbc), "--toml", str(toml), "-o", str(page)]) == 0
+    assert main(["map", str(log), "--dbc", str(dbc), "--toml", str(toml), "-o", str(page)]) == 0
     said = capsys.readouterr().out
     assert "--map theta=InceptorPosition.LvrAngle theta_dot=InceptorPosition.LvrRate z_ddot=AhrsAccel.AccVert" in said
     assert page.read_text().count("<svg") == 4
@@ -77,7 +77,7 @@ def test_the_proposal_can_be_used_as_it_is(folder: Path, tmp_path: Path, capsys:
 
 def test_columns_and_a_picture(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     picture = tmp_path / "signals.png"
-    assert cli.main(["map", str(folder / "columns.csv"), "-o", str(picture)]) == 0
+    assert main(["map", str(folder / "columns.csv"), "-o", str(picture)]) == 0
     assert "--map 'theta=Lever angle' 'theta_dot=Lever rate' 'z_ddot=Vertical acc.'" in capsys.readouterr().out
     assert picture.read_bytes().startswith(b"\x89PNG")
 
@@ -105,12 +105,12 @@ def test_what_has_no_unit_is_proposed_with_one(
     log = tmp_path / "flight.csv"
     rows = (",".join(f"{value:.6f}" for value in row) for row in zip(*columns.values(), strict=True))
     log.write_text("\n".join([",".join(columns), *rows]))
-    assert cli.main(["map", str(log)]) == 0
+    assert main(["map", str(log)]) == 0
     said = capsys.readouterr().out
     assert f"z_ddot = floor_acc has no unit: {unit} is assumed (" in said
     assert f"theta_dot = lever_rate has no unit: {rate} is assumed (" in said
     (command,) = (line for line in said.splitlines() if line.startswith("lever replay"))
-    assert cli.main(shlex.split(command)[1:]) == 0
+    assert main(shlex.split(command)[1:]) == 0
     assert "is one of them in another unit" not in capsys.readouterr().out
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.library import struct_dtype
 from lever_sil.scenarios import inputs
 from lever_sil.soak import flights, soak
@@ -21,7 +21,7 @@ Content = dict[str, Any]
 def summary(tmp_path_factory: pytest.TempPathFactory) -> Content:
     folder = tmp_path_factory.mktemp("soak")
     page, path = folder / "soak.html", folder / "soak.json"
-    assert cli.main(["soak", "--hours", "0.1667", "--json", str(path), "-o", str(page)]) == 0
+    assert main(["soak", "--hours", "0.1667", "--json", str(path), "-o", str(page)]) == 0
     content: Content = json.loads(path.read_text())
     assert "Consistency by the hour" in page.read_text()
     return content
@@ -76,7 +76,7 @@ def test_what_is_wrong_shows() -> None:
     assert wrong.row()["k_p within 2 sigma [%]"] == 0.0
     assert wrong.silent_s == pytest.approx(wrong.unflagged * 0.02)
     part = soak.Part(soak.Sums(not_finite=3, in_fault=50), 130.0)
-    troubles = soak.Result([part], 100.0, Counter()).troubles()
+    troubles = soak.SoakResult([part], 100.0, Counter()).troubles()
     assert troubles == [
         "3 estimates were not finite",
         "the estimator was in fault for 1 s",
@@ -86,5 +86,5 @@ def test_what_is_wrong_shows() -> None:
 
 def test_wrong_hours_are_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     for hours in ("0", "-1", "nan", "1e9"):
-        assert cli.main(["soak", f"--hours={hours}"]) == 2
+        assert main(["soak", f"--hours={hours}"]) == 2
         assert "above 0, and at most 1000" in capsys.readouterr().err

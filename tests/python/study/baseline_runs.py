@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.native import settings_table
+from lever_cdkf.numeric.arrays import Array
 from lever_sil.study.data import Batch, Knowledge, Truth
 from oracle import Lever
 

@@ -13,7 +13,7 @@ from lever_sil.study.baselines.dual_ekf import DualEkf
 from lever_sil.study.baselines.joint_ekf import JointEkf
 from lever_sil.study.baselines.joint_ukf import JointUkf
 from lever_sil.study.baselines.recursion import Recursion, follow
-from lever_sil.study.compare import campaign, cases
+from lever_sil.study.compare import cases, run_cases
 from lever_sil.study.data import Batch
 
 REFERENCES: dict[str, tuple[Callable[[Batch], Recursion], float]] = {
@@ -37,7 +37,7 @@ CASES = (
 def test_the_c_says_what_the_reference_says(name: str, baseline: str) -> None:
     case = cases.cases()[name]
     batch = case.batch(cases.Plan(seeds=2, duration=2.0))
-    at = np.append(0, campaign.samples(case, batch))  # also before the first sample is followed
+    at = np.append(0, run_cases.samples(case, batch))  # also before the first sample is followed
     reference, near = REFERENCES[baseline]
     quick, slow = BASELINES[baseline].run(batch, at), follow(reference(batch), at)
     assert quick.covariance is not None
@@ -53,7 +53,7 @@ def test_the_c_says_what_the_reference_says(name: str, baseline: str) -> None:
 def test_a_missing_output_is_left_to_the_reference() -> None:
     case = cases.cases()["lever_trim_base_rough"]
     batch = case.batch(cases.Plan(seeds=2, duration=1.0))
-    at = campaign.samples(case, batch)
+    at = run_cases.samples(case, batch)
     half = replace(batch, missing=np.tile([True, False], (2, batch.samples, 1)))
     expected = follow(JointEkf(half), at)
     assert np.array_equal(BASELINES["joint_ekf"].run(half, at).w, expected.w)

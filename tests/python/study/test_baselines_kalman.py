@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 from lever_sil.study.baselines.algorithm1 import ParameterFilter
 from lever_sil.study.baselines.dual_ekf import DualEkf
 from lever_sil.study.baselines.joint_ekf import JointEkf

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import Array
 from lever_cdkf.models.linear import LinearBlackBox, LinearPhysical
+from lever_cdkf.numeric.arrays import Array
 from lever_sil.study.baselines.balance import Ratios, Same
 from lever_sil.study.baselines.lms import Nlms
 from lever_sil.study.baselines.regression import Equations, equations

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
-from lever_cdkf.arrays import Array
+from lever_cdkf.cli.main import main
 from lever_cdkf.errors import LeverError
+from lever_cdkf.numeric.arrays import Array
 from lever_sil.study.baselines import BASELINES
 from lever_sil.study.candidate import Config, Sample, candidate
-from lever_sil.study.compare import campaign, dataset, entrants, evaluation
+from lever_sil.study.compare import dataset, entrants, evaluation, run_cases
 from lever_sil.study.compare.cases import Plan, cases
 from lever_sil.study.data import Batch
 
@@ -109,7 +109,7 @@ def test_scores_are_those_of_the_estimates(files: Path) -> None:
     rows = []
     for plan in (PLAN, dataset.plan_of(files)[0]):
         entrants.enter("own_estimators:Guess")
-        results = campaign.run(campaign.tasks([TRIM], ["own_estimators:Guess"], plan), jobs=1)
+        results = run_cases.run(run_cases.tasks([TRIM], ["own_estimators:Guess"], plan), jobs=1)
         rows += evaluation.judge(results)
     batch = cases()[TRIM].batch(PLAN)
     assert batch.truth.p is not None
@@ -124,7 +124,7 @@ def test_scores_are_those_of_the_estimates(files: Path) -> None:
 
 def test_an_estimator_that_breaks_down_is_counted() -> None:
     entrants.enter("own_estimators:Breaks")
-    results = campaign.run(campaign.tasks([TRIM], ["own_estimators:Breaks"], PLAN), jobs=1)
+    results = run_cases.run(run_cases.tasks([TRIM], ["own_estimators:Breaks"], PLAN), jobs=1)
     (row,) = evaluation.judge(results)
     assert (row.runs, row.failures, row.ranked) == (2, 2, False)
 
@@ -175,7 +175,7 @@ def test_move_is_the_step_of_the_batch() -> None:
 def test_the_command_says_what_does_not_go_together(
     words: tuple[str, ...], says: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["compare", *words]) == 2
+    assert main(["compare", *words]) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert says in line
 

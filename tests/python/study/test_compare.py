@@ -14,27 +14,18 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from lever_cdkf import interrupts
 from lever_cdkf.firmware.config import setting
 from lever_cdkf.firmware.native import enum_names, settings_table
-from lever_cdkf.provenance import provenance
 from lever_cdkf.report import figure as drawing
+from lever_cdkf.runtime import interrupts
+from lever_cdkf.runtime.provenance import provenance
 from lever_sil.scenarios import scenario
 from lever_sil.study.baselines import BASELINES
-from lever_sil.study.compare import (
-    campaign,
-    charts,
-    compare_page,
-    comparison,
-    evaluation,
-    printed,
-    table,
-    verdicts,
-)
-from lever_sil.study.compare.campaign import Outcome, Results
+from lever_sil.study.compare import charts, compare_page, comparison, evaluation, printed, run_cases, table, verdicts
 from lever_sil.study.compare.cases import ON_REQUEST, Matched, Plan, References, Stepped, cases
 from lever_sil.study.compare.entrants import entrants, tuning_name, wrongly_tuned
 from lever_sil.study.compare.evaluation import Row
+from lever_sil.study.compare.run_cases import Outcome, Results
 from lever_sil.study.data import Batch, Estimates
 from numpy.typing import NDArray
 from python.conftest import Refused, Run
@@ -129,7 +120,7 @@ def test_tuned_wrong_alone_and_in_pairs() -> None:
 def test_the_firmware_takes_the_settings_of_each_entrant(name: str) -> None:
     case, plan = cases()[name], Plan(1, 1.0)
     batch = case.batch(plan)
-    at = campaign.samples(case, batch)
+    at = run_cases.samples(case, batch)
     for entrant in entrants(case).values():
         if entrant.ours:
             assert np.isfinite(entrant.make(case)(batch, at).w).all(), entrant.name
@@ -210,7 +201,7 @@ def test_errors_of_signed_parameters_are_relative_to_the_truth() -> None:
     at = np.array([500, 900])
     assert batch.truth.p is not None
     w = batch.knowledge.scaled(1.1 * batch.truth.p[:, at])
-    outcome = campaign.outcome(batch, Estimates(at, w, None), 1.0)
+    outcome = run_cases.outcome(batch, Estimates(at, w, None), 1.0)
     np.testing.assert_allclose(np.abs(outcome.relative[..., :3]), 0.1, rtol=1e-9)
 
 
@@ -598,7 +589,7 @@ def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.Monkey
     assert all(f'id="{key}"' in page for key in drawn)
     assert len(json.loads(tables.read_text())) == 3  # and provenance
     monkeypatch.setattr(interrupts, "worker_pool", None)  # not called for one process
-    alone = campaign.run(campaign.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
+    alone = run_cases.run(run_cases.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
     (row,) = evaluation.judge(alone)
     assert float(walk["linearised_natural_frequency"]) == row.linearised[3]
 

@@ -23,8 +23,8 @@ import pandas as pd
 import pytest
 import screenshot
 from fontTools.ttLib import TTFont
-from lever_cdkf import cli
-from lever_cdkf.provenance import provenance
+from lever_cdkf.cli.main import main
+from lever_cdkf.runtime.provenance import provenance
 from lever_sil.study.figures import catalogue, figures_page, printed, runs
 from lever_sil.study.figures.description import Band, Column, Curve, Figure, Points, Row, Surface
 from lever_sil.study.figures.paper import PAPER
@@ -75,7 +75,7 @@ def commands() -> Iterator[None]:
 def folder(commands: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return what `lever figures` leaves behind."""
     out = tmp_path_factory.mktemp("figures") / "deep" / "folder"
-    assert cli.main(["figures", "--seed", str(SEED), "--out", str(out)]) == 0
+    assert main(["figures", "--seed", str(SEED), "--out", str(out)]) == 0
     return out
 
 
@@ -84,7 +84,7 @@ def lever(capsys: pytest.CaptureFixture[str]) -> Run:
     """lever(*arguments): exit status, standard output, standard error."""
 
     def run(*arguments: str) -> tuple[int, str, str]:
-        status = cli.main(arguments)
+        status = main(arguments)
         captured = capsys.readouterr()
         return status, captured.out, captured.err
 

@@ -6,7 +6,7 @@ Seeds are fixed, so this is no lottery: a change of the firmware that costs accu
 from __future__ import annotations
 
 import pytest
-from lever_sil.study.compare import campaign, evaluation, verdicts
+from lever_sil.study.compare import evaluation, run_cases, verdicts
 from lever_sil.study.compare.cases import Plan
 
 RUNS = {("lever_fixed_dither_quiet", "linear_black_box_fixed_base_rough"): 10, ("step_up", "step_down"): 20}
@@ -29,7 +29,7 @@ MEASURED = {
 def claims() -> dict[str, verdicts.Claim]:
     rows: list[evaluation.Row] = []
     for cases, runs in RUNS.items():
-        rows += evaluation.judge(campaign.run(campaign.tasks(cases, ESTIMATORS, Plan(runs)), jobs=1))
+        rows += evaluation.judge(run_cases.run(run_cases.tasks(cases, ESTIMATORS, Plan(runs)), jobs=1))
     return {claim.text: claim for claim in verdicts.claims(rows)}
 
 

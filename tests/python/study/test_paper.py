@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.config import setting
+from lever_cdkf.numeric.arrays import Array
 from lever_sil.study.baselines.algorithm1 import ParameterFilter
-from lever_sil.study.compare import campaign, paper
+from lever_sil.study.compare import paper, run_cases
 from lever_sil.study.compare.cases import Plan, cases
 from lever_sil.study.data import Batch, Knowledge, Truth
 
@@ -155,7 +155,7 @@ def test_parameters_stay_drift_or_jump_and_estimators_are_told_the_same() -> Non
 def test_the_table_is_that_of_the_runs() -> None:
     """Computed anew from the errors of each run; both kinds of parameter noise are in it."""
     name = experiment("jump")
-    results = campaign.run(campaign.tasks([name], None, SHORT), jobs=1)
+    results = run_cases.run(run_cases.tasks([name], None, SHORT), jobs=1)
     (rows,) = paper.tables(results).values()
     by_name = {str(row["estimator"]): row for row in rows}
     assert {"dual_fixed", "dual_annealing", "dual_robbins_monro", "joint_annealing", "rls"} <= by_name.keys()

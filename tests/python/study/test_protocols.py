@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_sil.study.compare import protocols
-from lever_sil.study.compare.campaign import Outcome, Results
 from lever_sil.study.compare.cases import SQUARE, Plan, Protocol, cases
 from lever_sil.study.compare.entrants import entrants
 from lever_sil.study.compare.protocols import SQUARE_WAVE, accounted, remnants, square_wave
+from lever_sil.study.compare.run_cases import Outcome, Results
 
 PLAN = Plan(seeds=3, duration=4.0)
 """A tenth of the case's own duration: the halves of the square wave are 0.5 s."""

@@ -42,7 +42,7 @@ def test_truth_moves_as_the_plant_does(batch: Batch) -> None:
     columns = (p[run, :, 0], p[run, :, 1], p[run, :, 2], np.full(batch.samples, SHORT.trim))
     truth, base = lever_plant.Truth(*columns), shaken[run, :, 0]
     conditions = Conditions(base, PERIOD, 0.0, 0.0, np.random.default_rng(1))
-    body = lever_plant.Plant(lever_plant.Lever.from_settings(DEFAULTS), truth, "trim", conditions)
+    body = lever_plant.LeverPlant(lever_plant.Lever.from_settings(DEFAULTS), truth, "trim", conditions)
     expected = np.empty_like(x)
     for k in range(batch.samples):
         expected[k] = body.theta, body.theta_dot

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.settings_file import Assignments
+from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.tune import recording
 from lever_cdkf.tune.calibration import NAMES, Calibrated, calibrate
 from lever_cdkf.tune.likelihood import Likelihood

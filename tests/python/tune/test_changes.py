@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.signals.mapping import Mapping, Protection, Source, as_toml, read_mapping
 from lever_cdkf.tune import recording
 from lever_cdkf.tune.calibration import NAMES, calibrate
@@ -39,7 +39,7 @@ def test_a_log_that_the_model_does_not_explain_changes_nothing(
     simulate: Simulate, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     log, out, figures = simulate(30.0, tremor=0.3), tmp_path / "my.settings", tmp_path / "figures.json"
-    assert cli.main(["tune", str(log), "-o", str(out), "--json", str(figures)]) == 1
+    assert main(["tune", str(log), "-o", str(out), "--json", str(figures)]) == 1
     assert not out.exists()
     rows = json.loads(figures.read_text(encoding="utf-8"))["calibration"]
     assert [row["name"] for row in rows] == list(NAMES)

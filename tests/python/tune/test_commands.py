@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
 from lever_cdkf.can import codec
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.settings_file import make_config, read_assignments
 from lever_cdkf.tune import calibration
 from lever_cdkf.tune.calibration import NAMES
@@ -28,7 +28,7 @@ def tuned(steady_log: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with what a whole run of the command writes."""
     out = tmp_path_factory.mktemp("tuned")
     files = ["-o", str(out / "my.settings"), "--page", str(out / "tune.html"), "--json", str(out / "tune.json")]
-    assert cli.main(["tune", str(steady_log), *files]) == 0
+    assert main(["tune", str(steady_log), *files]) == 0
     return out
 
 

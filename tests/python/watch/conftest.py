@@ -17,7 +17,7 @@ from lever_cdkf.watch.picture import Frame
 from lever_cdkf.watch.sources import as_frame
 from python.conftest import swing
 
-LEVER = [sys.executable, "-m", "lever_cdkf.cli"]
+LEVER = [sys.executable, "-m", "lever_cdkf.cli.main"]
 
 
 class Flight:

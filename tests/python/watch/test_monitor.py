@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.watch.picture import Frame
 from lever_cdkf.watch.sources import Source
 from lever_cdkf.watch.terminal import SPANS, TALL, Monitor
@@ -157,7 +157,7 @@ def test_before_the_first_estimate_and_after_the_last(flight: Flight) -> None:
 
 
 def test_once(log: Path, flight: Flight, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["monitor", "--once", str(log)]) == 0
+    assert main(["monitor", "--once", str(log)]) == 0
     shown = capsys.readouterr()
     assert shown.err == ""
     assert "\x1b" not in shown.out
@@ -169,7 +169,7 @@ def test_once(log: Path, flight: Flight, capsys: pytest.CaptureFixture[str]) -> 
 
 def test_once_of_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
     running = threading.active_count()
-    assert cli.main(["monitor", "--scenario", "steady", "--once", "--duration", "3"]) == 0
+    assert main(["monitor", "--scenario", "steady", "--once", "--duration", "3"]) == 0
     assert threading.active_count() == running, "it goes on after the picture"
     assert re.search(
         r"^simulation of steady · model lever · watching for 0:\d\d min · firmware 0.2.0$",

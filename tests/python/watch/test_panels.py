@@ -8,7 +8,7 @@ import io
 import math
 
 import pytest
-from lever_cdkf import cli
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.library import ffi, lib
 from lever_cdkf.watch import panels
 from lever_cdkf.watch.picture import ERROR, Estimated, Picture
@@ -133,7 +133,7 @@ def test_one_picture_is_cut_nowhere(width: int, session: Session, monkeypatch: p
     monkeypatch.setenv("COLUMNS", str(width))
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
-        assert cli.main(["monitor", "--once", str(session.log)]) == 0
+        assert main(["monitor", "--once", str(session.log)]) == 0
     lines = said.getvalue().splitlines()
     assert max(map(len, lines)) <= width
     assert "…" not in said.getvalue()

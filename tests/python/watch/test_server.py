@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf import cli
-from lever_cdkf.arrays import ComplexArray, FloatArray
 from lever_cdkf.can import codec
 from lever_cdkf.can.commander import KEEP
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.library import enum_names
+from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
 from lever_cdkf.watch.server import Server
 from lever_cdkf.watch.sources import Source
 from lever_cdkf.watch.state import WITHOUT_TORQUE, State, command_of
@@ -536,16 +536,16 @@ def test_ends_cleanly_when_interrupted(number: int, start_lever: Callable[..., s
 @pytest.mark.requirement("S8")
 def test_an_open_port_is_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
     quick = ["--scenario", "steady", "--port", "0", "--duration", "0.1", "--host", "0.0.0.0"]
-    assert cli.main(["live", *quick]) == 0
+    assert main(["live", *quick]) == 0
     assert re.search(
         r"warning: anybody who reaches port \d+ can see and command the estimator", capsys.readouterr().err
     )
-    assert cli.main(["live", *quick, "--read-only"]) == 0
+    assert main(["live", *quick, "--read-only"]) == 0
     assert re.search(r"warning: anybody who reaches port \d+ can see the estimator", capsys.readouterr().err)
 
 
 def test_a_source_that_fails_is_told_at_the_end(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "garbage.log"
     path.write_text("(1.000000) can0 123#00\nnothing of the kind\n")
-    assert cli.main(["live", str(path), "--port", "0", "--duration", "0.5"]) == 2
+    assert main(["live", str(path), "--port", "0", "--duration", "0.5"]) == 2
     assert "garbage.log: 1 lines of it are not frames" in capsys.readouterr().err

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from lever_cdkf.files import write_text
+from lever_cdkf.runtime.files import write_text
 
 GOLDEN = Path(__file__).with_name("golden.json")
 TOLERANCE = 0.02

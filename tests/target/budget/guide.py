@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from lever_cdkf.files import write_text
 from lever_cdkf.firmware.library import ffi
+from lever_cdkf.runtime.files import write_text
 
 from .image import ESTIMATORS, FIRMWARE
 from .port_sizes import FUNCTIONS, TRANSPORTS, Size

@@ -9,8 +9,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from lever_cdkf.cli.tables import Row, Tables, print_tables
 from lever_cdkf.errors import LeverError
-from lever_cdkf.tables import Row, Tables, print_tables
 from numpy.typing import NDArray
 
 from . import image

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from lever_cdkf.tables import Row, print_tables
+from lever_cdkf.cli.tables import Row, print_tables
 
 from . import image, measure, sizes, trace
 from .recording import record

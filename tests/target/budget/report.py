@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from lever_cdkf.files import write_text
-from lever_cdkf.progress import Progress
-from lever_cdkf.tables import Row, Tables, print_tables
+from lever_cdkf.cli.progress import Progress
+from lever_cdkf.cli.tables import Row, Tables, print_tables
+from lever_cdkf.runtime.files import write_text
 
 from . import golden, guide, image, measure, port_sizes
 

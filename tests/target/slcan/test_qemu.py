@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 import serial
-from lever_cdkf import cli
 from lever_cdkf.board import qemu
+from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import CHOICES
 from vcan import rig
 
@@ -92,7 +92,7 @@ def test_it_ends_with_its_board(slcan_image: Path, number: signal.Signals, statu
 
 def says(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     """Return the one line with which the command refuses."""
-    assert cli.main(["qemu", *arguments]) == 2
+    assert main(["qemu", *arguments]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err.count("\n") == 1

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ...arrays import Array
 from ...firmware import native
+from ...numeric.arrays import Array
 from ..figure import Figure, Spec, axis, line, time_axis
 from ..run import Run
 from ..series import runs, spread_indices

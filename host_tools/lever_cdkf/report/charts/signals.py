@@ -4,10 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Array
 from ...firmware.quantities import DYNAMICS
+from ...numeric.arrays import Array
+from ...numeric.quantiles import chi_square_band
 from ...results.whiteness import COLOURED
-from ...statistics import chi_square_band
 from ..figure import Figure, Spec, axis, axis_range, band, dots, frequency_axis, line, time_axis
 from ..run import Run
 from ..series import envelope, packed, spread_indices

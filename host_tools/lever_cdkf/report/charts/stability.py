@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array
 from ...firmware.library import enum_names
+from ...numeric.arrays import Array
 from ...results.trace import CORRECTION, TRUE_MARGIN
 from ..figure import Figure, Spec, axis, axis_range, band, hover, line, time_axis
 from ..run import Run

@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...arrays import Array
 from ...firmware.quantities import DYNAMICS
+from ...numeric.arrays import Array
 from ...results.feedthrough import FREQUENCIES as SENT
 from .. import bode
 from ..bode import FREQUENCIES, magnitude_and_phase

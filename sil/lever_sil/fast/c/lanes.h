@@ -1,5 +1,5 @@
-/* The levers of envelope/plant.py, which shares nothing with plants.h: many runs side by side, by themselves or with
- * the firmware in the loop as in envelope/firmware.py.
+/* The levers of batch/plant.py, which shares nothing with plants.h: many runs side by side, by themselves or with
+ * the firmware in the loop as in batch/firmware.py.
  */
 #ifndef LANES_H
 #define LANES_H

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.errors import LeverError
 from lever_cdkf.models.lever import Lever
 from lever_cdkf.models.linear import LinearBlackBox, LinearPhysical
+from lever_cdkf.numeric.arrays import Array
 
 from ..data import Batch
 

@@ -17,7 +17,7 @@ makes a likelihood of the source's prediction-error cost; x stays where it is wh
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from ..data import PARAMETERS, STATES, Batch, Estimates

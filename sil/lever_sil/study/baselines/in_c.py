@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from lever_cdkf.models.lever import Lever
 from lever_cdkf.models.linear import LinearBlackBox, LinearPhysical
-from lever_cdkf.units import GRAVITY
+from lever_cdkf.text.units import GRAVITY
 from numpy.typing import NDArray
 
 from ...fast.library import Struct, lib

@@ -11,7 +11,7 @@ exact to rounding; process and measurement noise as known; covariance P - K S Ká
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from ..data import OUTPUTS, PARAMETERS, STATES, Batch, Estimates

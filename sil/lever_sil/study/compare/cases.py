@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
 import numpy as np
-from lever_cdkf.arrays import Array, BoolArray
 from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.numeric.arrays import Array, BoolArray
 from numpy.typing import NDArray
 
 from ...scenarios import scenario as scenarios

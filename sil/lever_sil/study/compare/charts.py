@@ -8,15 +8,15 @@ from itertools import cycle, groupby
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.report.figure import SERIES, Figure, Spec, axis, band, dots, line
 
 from ..baselines import BASELINES
 from ..scores import settling_times
-from .campaign import Results
 from .cases import cases
 from .entrants import OURS, entrants
 from .evaluation import FREQUENCY, Row, quantities
+from .run_cases import Results
 
 COLOURS = dict(zip((*OURS, *BASELINES), cycle(SERIES)))
 """Of an estimator, on all charts; that of the firmware has the same in all its settings."""

@@ -6,15 +6,15 @@ import html
 import math
 from collections.abc import Mapping, Sequence
 
+from lever_cdkf.cli.tables import Row as TableRow
 from lever_cdkf.report.figure import Spec
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import number, table
-from lever_cdkf.tables import Row as TableRow
 
 from . import charts
-from .campaign import Results
 from .cases import PRIOR, cases
 from .evaluation import Row
+from .run_cases import Results
 from .verdicts import Claim
 
 _ESTIMATORS = 6  # in a table

@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.errors import LeverError
-from lever_cdkf.extras import require
-from lever_cdkf.files import Outputs, write_text, writing
 from lever_cdkf.firmware.config import settings_table
-from lever_cdkf.provenance import provenance, sha256
+from lever_cdkf.numeric.arrays import Array
+from lever_cdkf.runtime.extras import require
+from lever_cdkf.runtime.files import Outputs, write_text, writing
+from lever_cdkf.runtime.provenance import provenance, sha256
 
 from ..data import Batch, Knowledge, Truth
 from ..detrended import detrended

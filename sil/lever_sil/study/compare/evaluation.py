@@ -7,15 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from lever_cdkf.arrays import Array, BoolArray
+from lever_cdkf.numeric.arrays import Array, BoolArray
 
 from ..data import OUTPUTS, PARAMETERS
 from ..matched import KINDS
 from ..scores import Consistency, consistency, median_and_worst, ratio, ratio_spread, rms, settling_times, sigma_ratio
-from .campaign import Outcome, Results
 from .cases import Case, References, cases
 from .comparison import Differences, corrected, of_errors, of_times
 from .entrants import Entrant, entrants
+from .run_cases import Outcome, Results
 
 Five = tuple[float, float, float, float, float]
 """Of the three parameters, natural frequency and damping ratio; NaN: not known."""

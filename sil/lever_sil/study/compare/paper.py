@@ -7,15 +7,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
-from lever_cdkf.tables import Cell, Row
+from lever_cdkf.cli.tables import Cell, Row
+from lever_cdkf.numeric.arrays import Array
 
 from ..data import PARAMETERS
 from ..scores import settling_times
-from .campaign import Outcome, Results
 from .cases import Case, Paper, Plan, cases
 from .entrants import tuning_name, wrongly_tuned
 from .evaluation import FREQUENCY
+from .run_cases import Outcome, Results
 
 SEEDS = 20
 TUNING = ("wrong_tuning_fixed", "wrong_tuning_trim")

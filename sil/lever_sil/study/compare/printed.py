@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.exports import pictures
-from lever_cdkf.provenance import Provenance
+from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.report.figure import Spec
+from lever_cdkf.runtime.provenance import Provenance
 
 from ..figures.typesetting import Colour, colours, in_mathtext
 

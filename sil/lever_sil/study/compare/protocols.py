@@ -7,15 +7,15 @@ questions are the same.
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.arrays import Array
-from lever_cdkf.tables import Row
+from lever_cdkf.cli.tables import Row
+from lever_cdkf.numeric.arrays import Array
 
 from ..data import PARAMETERS, Batch
 from ..scores import settling_times
-from .campaign import Outcome, Results
 from .cases import SQUARE, Protocol, cases
 from .evaluation import FREQUENCY
 from .paper import pair
+from .run_cases import Outcome, Results
 
 SEEDS = 100
 SQUARE_WAVE = "square_wave"

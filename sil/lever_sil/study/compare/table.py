@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import fields
 from itertools import groupby
 
-from lever_cdkf.tables import Cell
-from lever_cdkf.tables import Row as TableRow
+from lever_cdkf.cli.tables import Cell
+from lever_cdkf.cli.tables import Row as TableRow
 
 from .cases import cases
 from .entrants import entrants

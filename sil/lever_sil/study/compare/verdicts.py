@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from lever_cdkf.statistics import normal_quantile
+from lever_cdkf.numeric.quantiles import normal_quantile
 
 from .cases import Matched, Stepped, cases
 from .comparison import LEAST_RUNS, LEVEL, Differences

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.models.lever import Lever
+from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.report.bode import FREQUENCIES, transfer
 
 from ..data import rest_angle

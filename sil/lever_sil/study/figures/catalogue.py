@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from lever_cdkf.errors import LeverError
-from lever_cdkf.near_names import did_you_mean
+from lever_cdkf.text.suggestions import did_you_mean
 
 from . import bode, consistency, grip, identification, linear
 from .description import Figure

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.arrays import Array
-from lever_cdkf.statistics import chi_square_band
+from lever_cdkf.numeric.arrays import Array
+from lever_cdkf.numeric.quantiles import chi_square_band
 
 from ..data import PARAMETERS
 from ..firmware import Firmware

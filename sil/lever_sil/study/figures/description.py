@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 import numpy as np
-from lever_cdkf.arrays import Array
+from lever_cdkf.numeric.arrays import Array
 
 _MARGIN = 0.05  # of a y axis, above and below
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.config import setting
 from lever_cdkf.firmware.native import Config, lib
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from ..data import Batch

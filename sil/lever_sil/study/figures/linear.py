@@ -9,8 +9,8 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.config import setting
+from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from ..data import Batch

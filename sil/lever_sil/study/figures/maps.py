@@ -16,8 +16,8 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.exports import pictures
+from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.report.figure import Spec, axis
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.exports import pictures
-from lever_cdkf.provenance import Provenance
+from lever_cdkf.runtime.provenance import Provenance
 
 from . import maps
 from .description import LOOKS, Band, Column, Figure, Points, Surface, Trace

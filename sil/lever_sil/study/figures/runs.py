@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.arrays import Array
 from lever_cdkf.firmware.native import Config, run_samples
+from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.report.series import spread_indices
 from numpy.typing import NDArray
 

@@ -1,0 +1,1 @@
+"""The process and its installation: files, provenance, optional dependencies, and Ctrl-C."""

@@ -1,0 +1,162 @@
+"""Files: where the package's own are, and how to write one that is never half written."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import lever_cdkf
+
+from ..errors import LeverError
+from . import interrupts
+
+LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
+"""Environment variable for development: folders (separated like PATH) that are searched before the installed files."""
+
+
+def native_file(name: str) -> Path:
+    """Return the path of `name` (shared library, its declarations, lever.dbc), which installing has put into
+    `_native`."""
+    folders = [Path(folder) for folder in os.environ.get(LIBRARY_DIR, "").split(os.pathsep) if folder]
+    folders += [Path(folder) / "_native" for folder in lever_cdkf.__path__]  # two, if the install is editable
+    for folder in folders:
+        if (folder / name).is_file():
+            return folder / name
+    searched = ", ".join(str(folder) for folder in folders)
+    raise LeverError(f"{name} is not in {searched}: install the package (pip install .) or set {LIBRARY_DIR}")
+
+
+def shared_library(name: str) -> str:
+    """Return the file name of a shared library on this system."""
+    return {"darwin": f"lib{name}.dylib", "win32": f"{name}.dll"}.get(sys.platform, f"lib{name}.so")
+
+
+def write_text(path: str | os.PathLike[str], text: str) -> None:
+    """Write `text` as UTF-8, as whole() does. Raise LeverError."""
+    write_texts({Path(path): text})
+
+
+def json_text(content: Any) -> str:
+    """Return a file of JSON. Raise ValueError for NaN and infinity, which JSON does not have."""
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def write_texts(texts: Mapping[Path, str]) -> None:
+    """Write files, all or none, but for what fails when all are written. Raise LeverError."""
+    with ExitStack() as stack:
+        for path, text in texts.items():
+            target = stack.enter_context(whole(path))
+            with writing(path):
+                target.write_text(text, encoding="utf-8")
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Raise LeverError where whole() could not write: before work that would be lost."""
+    final = Path(path)
+    if final.is_dir():
+        raise LeverError(f"cannot write {path}: it is a folder")
+    if final.is_file() or not final.exists():
+        with writing(final), tempfile.TemporaryFile(dir=Path(os.path.realpath(path)).parent):
+            pass
+
+
+@contextmanager
+def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Where to write so that the file `path` holds either all of it or what it held before. Raise LeverError.
+
+    What is not a file (/dev/stdout, a named pipe) is written to as it is.
+    """
+    final = Path(path)
+    in_place = final.exists() and not final.is_file()
+    if not in_place:
+        final = Path(os.path.realpath(final))  # of a symbolic link, the file and not the link is replaced
+    target = final if in_place else final.with_name(f".{final.name}.{os.getpid()}.tmp")
+    try:
+        with writing(Path(path)):
+            yield target
+            if not in_place:
+                os.replace(target, final)
+    finally:
+        if not in_place:
+            with suppress(OSError):
+                target.unlink()
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, where they are not there yet. Raise LeverError."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise LeverError(f"cannot make the folder {folder}: {error.strerror}") from None
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Raise LeverError, which names `path`, for an OSError inside."""
+    try:
+        yield
+    except OSError as error:
+        raise LeverError(f"cannot write {path}: {error.strerror or error}") from None
+
+
+def check_not_input(path: str | os.PathLike[str] | None, inputs: Iterable[str | os.PathLike[str]]) -> None:
+    """Raise LeverError when writing to `path` would overwrite one of `inputs`."""
+    with suppress(OSError):  # one of them is not there
+        if path is not None and any(os.path.samefile(path, each) for each in inputs if os.path.exists(each)):
+            raise LeverError(f"cannot write {path}: it is an input: choose another folder or name")
+
+
+class Outputs:
+    """The files of a command in a folder: written into a hidden one in it, and put into place together when all are
+    whole. A context manager; without finish() it leaves what was there before, and nothing else."""
+
+    def __init__(self, folder: Path, inputs: Iterable[str | os.PathLike[str]] = (), names: Iterable[str] = ()) -> None:
+        """Protect `inputs` of the command from being written over; finish() removes the files among `names` that an
+        earlier run has left and this one has not made."""
+        self._folder = folder
+        self._may_be_there = tuple(names)
+        self._unfinished = folder
+        self._inputs = list(inputs)
+        self._names: list[str] = []
+
+    def __enter__(self) -> Outputs:
+        make_folder(self._folder)
+        with writing(self._folder):
+            self._unfinished = Path(tempfile.mkdtemp(".tmp", ".lever.", self._folder))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        shutil.rmtree(self._unfinished, ignore_errors=True)
+
+    def path(self, name: str) -> Path:
+        """Where to write the file `name`. Raise LeverError when in its place is an input, or a folder."""
+        final = self._folder / name
+        check_not_input(final, self._inputs)
+        if final.is_dir():
+            raise LeverError(f"cannot write {final}: it is a folder")
+        self._names.append(name)
+        return self._unfinished / name
+
+    def written(self, *names: str) -> list[Path]:
+        """Where those of these files are that have been asked for."""
+        return [self._unfinished / name for name in names if name in self._names]
+
+    def finish(self) -> None:
+        """Put the files into their place; the last one asked for is there only when all are. Raise LeverError."""
+        interrupts.check()
+        with writing(self._folder):
+            (self._folder / self._names[-1]).unlink(missing_ok=True)
+            for name in set(self._may_be_there) - set(self._names):
+                (self._folder / name).unlink(missing_ok=True)
+            for name in self._names:
+                os.replace(self._unfinished / name, self._folder / name)

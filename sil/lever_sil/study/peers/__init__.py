@@ -1,7 +1,0 @@
-"""`lever compare --envelope`: joint EKF and UKF on the logs of `lever envelope`, beside the firmware.
-
-logs.py      the conditions of lever_sil/envelope as logs: what the sensors said, and what the firmware made of it
-filters.py   the peers on many logs at once, with and without a high-pass
-campaign.py  runs both, in processes, and brings back figures of each run
-tables.py    tables and verdicts
-"""
