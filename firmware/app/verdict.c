@@ -16,7 +16,7 @@
 
 const verdict_row_t verdict_rows[VERDICT_COUNT] = {
 #define VERDICT(name, evidence, learn, adapt, torque, correction, margin, entry, exit, meaning)                        \
-    {(evidence), (learn) != 0, (adapt) != 0, (torque), (correction), (margin), (uint8_t)(entry), (uint8_t)(exit)},
+    {(evidence), (torque), (correction), (margin), (learn) != 0, (adapt) != 0, (uint8_t)(entry), (uint8_t)(exit)},
 #include "app/verdict.def"
 };
 

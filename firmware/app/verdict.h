@@ -27,13 +27,13 @@ enum verdict_action {
 };
 
 typedef struct verdict_row {
-    uint32_t evidence; /* a bit each, of enum evidence_id */
-    bool learn;
-    bool adapt;
+    uint32_t evidence;   /* a bit each, of enum evidence_id */
     uint32_t torque;     /* faults that forbid it, of enum lever_fault and VERDICT_NEVER */
     uint32_t correction; /* likewise */
     uint32_t margin;     /* likewise */
-    uint8_t entry;       /* enum verdict_action */
+    bool learn;
+    bool adapt;
+    uint8_t entry; /* enum verdict_action */
     uint8_t exit;
 } verdict_row_t;
 
