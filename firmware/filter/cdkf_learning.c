@@ -197,7 +197,7 @@ void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot)
 
 void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot)
 {
-    of_w_t of_w;
+    of_w_t of_w = {0};
     lift(cdkf, of_w);
     open_parameters(cdkf);
     (void)memcpy(cdkf->w, snapshot->w, sizeof snapshot->w);
@@ -220,7 +220,7 @@ void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
 {
     const float growth = cdkf->growth * period;
     if (growth != 0.0f) { /* a NaN is to show */
-        of_w_t of_w;
+        of_w_t of_w = {0};
         lift(cdkf, of_w);
         const float stretch = sqrtf(1.0f + growth);
         const float shrink = 1.0f / stretch;
@@ -243,7 +243,7 @@ void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
 void cdkf_walk(cdkf_t *cdkf, float period, const float variance[MODEL_PARAMETERS], bool joint)
 {
     float unexplained[N * L];
-    of_w_t of_w;
+    of_w_t of_w = {0};
     lift(cdkf, of_w);
     for (uint32_t i = 0u; i < L; i++) {
         float rest[N];
