@@ -14,15 +14,19 @@
 
 /* --- considered errors while the columns of S change --------------------------------------------------------------- */
 
-typedef float of_w_t[CDKF_CONSIDERED][MODEL_PARAMETERS];
+typedef struct lifted {
+    uint32_t acting;
+    float of_w[CDKF_CONSIDERED][MODEL_PARAMETERS];
+} lifted_t;
 
 /* Before they change: S_ww w, which is kept in between, and S_xw w + x stay. */
-static void lift(cdkf_t *cdkf, of_w_t of_w)
+static void lift(cdkf_t *cdkf, lifted_t *lifted)
 {
-    for (uint32_t c = 0u; c < cdkf->acting; c++) {
+    lifted->acting = cdkf->acting;
+    for (uint32_t c = 0u; c < lifted->acting; c++) {
         considered_t *considered = &cdkf->considered[c];
         for (uint32_t i = 0u; i < L; i++) {
-            of_w[c][i] = factor_dot_three(&cdkf->s[i * L], considered->w);
+            lifted->of_w[c][i] = factor_dot_three(&cdkf->s[i * L], considered->w);
         }
         for (uint32_t i = 0u; i < N; i++) {
             considered->x[i] += factor_dot_three(&cdkf->s[(L + i) * L], considered->w);
@@ -31,15 +35,16 @@ static void lift(cdkf_t *cdkf, of_w_t of_w)
 }
 
 /* After it. */
-static void lower(cdkf_t *cdkf, of_w_t of_w)
+static void lower(cdkf_t *cdkf, const lifted_t *lifted)
 {
     const float *s = cdkf->s;
-    for (uint32_t c = 0u; c < cdkf->acting; c++) {
+    for (uint32_t c = 0u; c < lifted->acting; c++) {
+        const float *of_w = lifted->of_w[c];
         considered_t *considered = &cdkf->considered[c];
         float *w = considered->w; /* forward substitution */
-        w[0] = of_w[c][0] / s[0];
-        w[1] = (of_w[c][1] - (s[L] * w[0])) / s[L + 1u];
-        w[2] = (of_w[c][2] - (s[2u * L] * w[0]) - (s[(2u * L) + 1u] * w[1])) / s[(2u * L) + 2u];
+        w[0] = of_w[0] / s[0];
+        w[1] = (of_w[1] - (s[L] * w[0])) / s[L + 1u];
+        w[2] = (of_w[2] - (s[2u * L] * w[0]) - (s[(2u * L) + 1u] * w[1])) / s[(2u * L) + 2u];
         for (uint32_t i = 0u; i < N; i++) {
             considered->x[i] -= factor_dot_three(&s[(L + i) * L], w);
         }
@@ -176,8 +181,8 @@ static void open_parameters(cdkf_t *cdkf)
 
 void cdkf_open(cdkf_t *cdkf)
 {
-    of_w_t unused; /* what the prior says of w is not of these errors */
-    lift(cdkf, unused);
+    lifted_t unused; /* what the prior says of w is not of these errors */
+    lift(cdkf, &unused);
     open_parameters(cdkf);
     considered_start_w(cdkf->considered);
 }
@@ -197,8 +202,8 @@ void cdkf_keep(const cdkf_t *cdkf, snapshot_t *snapshot)
 
 void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot)
 {
-    of_w_t of_w = {0};
-    lift(cdkf, of_w);
+    lifted_t lifted;
+    lift(cdkf, &lifted);
     open_parameters(cdkf);
     (void)memcpy(cdkf->w, snapshot->w, sizeof snapshot->w);
     uint32_t k = 0u;
@@ -210,7 +215,7 @@ void cdkf_return(cdkf_t *cdkf, const snapshot_t *snapshot)
     }
     cdkf->trust = snapshot->trust;
     if (snapshot->trust >= 1.0f) { /* what the considered errors made of w then was nearly the same */
-        lower(cdkf, of_w);
+        lower(cdkf, &lifted);
     } else {
         considered_start_w(cdkf->considered);
     }
@@ -220,8 +225,8 @@ void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
 {
     const float growth = cdkf->growth * period;
     if (growth != 0.0f) { /* a NaN is to show */
-        of_w_t of_w = {0};
-        lift(cdkf, of_w);
+        lifted_t lifted;
+        lift(cdkf, &lifted);
         const float stretch = sqrtf(1.0f + growth);
         const float shrink = 1.0f / stretch;
         const float rest = sqrtf(growth) * shrink;
@@ -233,7 +238,7 @@ void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
         for (uint32_t k = 0u; k < (L * L); k++) {
             cdkf->s[k] *= stretch;
         }
-        lower(cdkf, of_w);
+        lower(cdkf, &lifted);
         if (joint) {
             add_to_state(cdkf, unexplained);
         }
@@ -243,15 +248,15 @@ void cdkf_forget(cdkf_t *cdkf, float period, bool joint)
 void cdkf_walk(cdkf_t *cdkf, float period, const float variance[MODEL_PARAMETERS], bool joint)
 {
     float unexplained[N * L];
-    of_w_t of_w = {0};
-    lift(cdkf, of_w);
+    lifted_t lifted;
+    lift(cdkf, &lifted);
     for (uint32_t i = 0u; i < L; i++) {
         float rest[N];
         factor_add_noise(cdkf->s, ROWS, L, i, sqrtf((cdkf->walk[i] * period) + variance[i]), rest);
         unexplained[i] = rest[0];
         unexplained[L + i] = rest[1];
     }
-    lower(cdkf, of_w);
+    lower(cdkf, &lifted);
     if (joint) {
         add_to_state(cdkf, unexplained);
     }
