@@ -11,17 +11,17 @@
 #define SOUND (RUNNING | (uint32_t)LEVER_FAULT_THETA | (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_BOUND)
 
 static const verdict_row_t expected[VERDICT_COUNT] = {
-    /* evidence (tested below), learn, adapt, torque, correction, margin, on entry, on exit */
-    [VERDICT_MOTOR_WRONG] = {0u, false, false, NEVER, RUNNING, SOUND, ACTION_RESTORE, 0u},
-    [VERDICT_HANDS_OFF] = {0u, false, false, NEVER, NEVER, NEVER, ACTION_RESTORE, ACTION_OPEN},
-    [VERDICT_SENSOR_WRONG] = {0u, false, false, ALWAYS, RUNNING, SOUND, ACTION_RESTORE, 0u},
-    [VERDICT_NOISE] = {0u, false, false, ALWAYS, RUNNING, SOUND, ACTION_RESTORE, 0u},
-    [VERDICT_BLIND] = {0u, false, false, ALWAYS, RUNNING, SOUND, 0u, 0u},
-    [VERDICT_SETTLING] = {0u, false, false, ALWAYS, RUNNING, SOUND, 0u, 0u},
-    [VERDICT_REST] = {0u, false, false, ALWAYS, RUNNING, SOUND, 0u, 0u},
-    [VERDICT_REGRIP] = {0u, false, false, ALWAYS, RUNNING, SOUND, ACTION_INFLATE, ACTION_LEVELS},
-    [VERDICT_NEW] = {0u, true, false, ALWAYS, RUNNING, SOUND, 0u, 0u},
-    [VERDICT_LEARNING] = {0u, true, true, ALWAYS, RUNNING, SOUND, 0u, 0u}};
+    /* evidence (tested below), torque, correction, margin, learn, adapt, on entry, on exit */
+    [VERDICT_MOTOR_WRONG] = {0u, NEVER, RUNNING, SOUND, false, false, ACTION_RESTORE, 0u},
+    [VERDICT_HANDS_OFF] = {0u, NEVER, NEVER, NEVER, false, false, ACTION_RESTORE, ACTION_OPEN},
+    [VERDICT_SENSOR_WRONG] = {0u, ALWAYS, RUNNING, SOUND, false, false, ACTION_RESTORE, 0u},
+    [VERDICT_NOISE] = {0u, ALWAYS, RUNNING, SOUND, false, false, ACTION_RESTORE, 0u},
+    [VERDICT_BLIND] = {0u, ALWAYS, RUNNING, SOUND, false, false, 0u, 0u},
+    [VERDICT_SETTLING] = {0u, ALWAYS, RUNNING, SOUND, false, false, 0u, 0u},
+    [VERDICT_REST] = {0u, ALWAYS, RUNNING, SOUND, false, false, 0u, 0u},
+    [VERDICT_REGRIP] = {0u, ALWAYS, RUNNING, SOUND, false, false, ACTION_INFLATE, ACTION_LEVELS},
+    [VERDICT_NEW] = {0u, ALWAYS, RUNNING, SOUND, true, false, 0u, 0u},
+    [VERDICT_LEARNING] = {0u, ALWAYS, RUNNING, SOUND, true, true, 0u, 0u}};
 
 void setUp(void)
 {
