@@ -79,7 +79,9 @@ static float state_sigma(const estimator_t *estimator, uint32_t i, float scale)
 void estimator_estimate(const estimator_t *estimator, lever_estimate_t *estimate)
 {
     const derived_dynamics_t dynamics = estimator_dynamics(estimator);
-    estimate->time_us = estimator->time_us;
+    const setup_t *setup = &estimator->setup;
+    const float delay_us = (float)setup->delay_samples * (setup->settings->sample_period * 1.0e6f);
+    estimate->time_us = estimator->time_us - (uint32_t)(delay_us + 0.5f);
     estimate->theta = estimator_state(estimator, 0u);
     estimate->theta_dot = estimator_state(estimator, 1u);
     estimate->theta_sigma = state_sigma(estimator, 0u, 1.0f / (TURN * estimator->setup.settings->trim_corner));

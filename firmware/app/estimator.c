@@ -46,6 +46,7 @@ static void start_filter(estimator_t *estimator)
 void estimator_start_over(estimator_t *estimator)
 {
     setup_choose(&estimator->setup);
+    delay_line_start(&estimator->line);
     start_filter(estimator);
     estimator->restarts = 0.0f;
     (void)memset(&estimator->trim, 0, sizeof estimator->trim);
@@ -56,7 +57,9 @@ void estimator_start_over(estimator_t *estimator)
     estimator->last_z_ddot = 0.0f;
     estimator->raw_z_ddot = 0.0f;
     estimator->base_missing = 0.0f;
+    estimator->torque_missing = 0.0f;
     estimator->last_tau_m = 0.0f;
+    estimator->last_rate = 0.0f;
     estimator->nis = 0.0f;
     estimator->nis_size = 0u;
     estimator->faults = 0u;
@@ -85,14 +88,15 @@ static bool is_usable(estimator_t *estimator, float value, bool valid, float mos
     return usable;
 }
 
-/* The true base acceleration of a sensor with gain and delay, the delay by extrapolation. */
+/* The true base acceleration of a sensor with gain and delay: of the time to which the other signals are delayed, which
+ * lies between this sample and the last. */
 static float compensated(estimator_t *estimator, float z_ddot, float elapsed)
 {
-    const lever_settings_t *s = estimator->setup.settings;
-    const bool late = (s->z_ddot_delay > 0.0f) && (elapsed > 0.0f);
-    const float ahead = late ? (s->z_ddot_delay * ((z_ddot - estimator->raw_z_ddot) / elapsed)) : 0.0f;
+    const setup_t *setup = &estimator->setup;
+    const float back = lesser(setup->delay_rest * setup->settings->sample_period, elapsed);
+    const float behind = (back > 0.0f) ? (back * ((z_ddot - estimator->raw_z_ddot) / elapsed)) : 0.0f;
     estimator->raw_z_ddot = z_ddot;
-    return seat_step(&estimator->seat, (z_ddot + ahead) * estimator->setup.base_scale, elapsed);
+    return seat_step(&estimator->seat, (z_ddot - behind) * setup->base_scale, elapsed);
 }
 
 /* An input that is plausible, but for some samples far from where it was. Not after it was missing, as `fault` of the
@@ -127,14 +131,19 @@ static void check(
     checked->y[1] = sample->theta_dot;
     checked->valid[0] = theta && evidence_sees(evidence, SIGNAL_THETA, sample->theta);
     checked->valid[1] = theta_dot && evidence_sees(evidence, SIGNAL_THETA_DOT, sample->theta_dot);
+    if (checked->valid[1]) {
+        sticking_add(&evidence->sticking, sample->theta_dot, elapsed);
+    }
     checked->base = base && evidence_sees(evidence, SIGNAL_BASE, sample->z_ddot);
     checked->gripped = is_usable(estimator, sample->grip_force, sample->grip_force_valid, OTHER_MAX);
     checked->grip_force = sample->grip_force;
     const bool jumped =
         checked->base && successive &&
         has_jumped(estimator, INPUT_BASE, LEVER_FAULT_BASE, sample->z_ddot - estimator->raw_z_ddot, elapsed);
-    checked->tau_m = torque_jumped ? estimator->last_tau_m : commanded_torque;
-    checked->tau_m = torque ? tau_m : checked->tau_m;
+    const bool unknown = !torque && evidence_has_other_torque(evidence);
+    const float presumed = (torque_jumped || unknown) ? estimator->last_tau_m : commanded_torque;
+    checked->tau_m = torque ? tau_m : presumed;
+    checked->torque = !unknown || torque_jumped;
     if (torque && ((estimator->samples % (uint32_t)EVIDENCE_TORQUE_EVERY) == 0u)) {
         evidence_add_torque(evidence, commanded_torque, checked->tau_m);
     }
@@ -205,7 +214,7 @@ static bool note_states(estimator_t *estimator, const checked_t *sample)
     const lever_settings_t *s = estimator->setup.settings;
     const bool measured = sample->valid[0] || sample->valid[1];
     const bool rests = evidence_is_at_rest(evidence, s->excitation_least, estimator->cdkf.output_noise[1]);
-    evidence_note(evidence, EVIDENCE_MISSING, !measured || (estimator->base_missing > 0.0f));
+    evidence_note(evidence, EVIDENCE_MISSING, !measured || (estimator->base_missing > 0.0f) || (estimator->torque_missing > 0.0f));
     evidence_note(evidence, EVIDENCE_UNSETTLED, estimator->trim.unsettled >= (0.5f * s->sample_period));
     evidence_note(evidence, EVIDENCE_REST, rests);
     note(estimator, rests, LEVER_FAULT_EXCITATION);
@@ -223,7 +232,8 @@ static void update_filter(estimator_t *estimator, const checked_t *sample, float
     if (informs && !evidence_has(evidence, EVIDENCE_REST)) {
         noise_estimation_add(&learning->noise, innovation, sample->valid);
         if (verdict_rows[learning->verdict].adapt) {
-            whiteness_add(&evidence->whiteness, innovation[sample->valid[1] ? 1u : 0u].value, elapsed);
+            const innovation_t *seen = &innovation[sample->valid[1] ? 1u : 0u];
+            whiteness_add(&evidence->whiteness, seen->value * sqrtf(seen->inverse_variance), elapsed);
         }
     }
     estimator->nis = ((innovation[0].value * innovation[0].value) * innovation[0].inverse_variance) +
@@ -325,7 +335,10 @@ enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *s
     } else {
         const float elapsed = (started && !new_clock) ? ((float)elapsed_us * 1.0e-6f) : 0.0f;
         checked_t checked;
-        check(estimator, sample, commanded_torque, elapsed, &checked);
+        lever_sample_t met = *sample;
+        float commanded = commanded_torque;
+        delay_line_pass(&estimator->line, estimator->setup.delay_samples, periods_in(estimator, elapsed), &met, &commanded);
+        check(estimator, &met, commanded, elapsed, &checked);
         estimator->late_series_us = 0u;
         if (started && !new_clock) {
             step(estimator, &checked, &last, elapsed);

@@ -19,6 +19,8 @@
 #define TORQUE_MEMORY 0.5f     /* [s] */
 #define TORQUE_MIN 4e-4f       /* mean square of the command from which on it says anything [N^2 m^2] */
 #define TORQUE_SURE 1.6f       /* torque of other origin over the command, both rms, that this is allowed times */
+#define OTHER_SHARE 0.01f      /* of its mean, by one sample in EVIDENCE_TORQUE_EVERY */
+#define OTHER_LEAST 2.5e-3f    /* mean square that is more than noise of the sensor [N^2 m^2] */
 #define AWAKE 0.3f             /* a rest lasts so much longer than the lack of motion [s] [rest_120s, freed] */
 #define REGRIP_TIME 0.038f     /* two blocks: a new grip is complete [s] [grip_step] */
 #define PROBATION 0.29f        /* until then a change has to explain the innovations [s] [rough_on_off] */
@@ -90,6 +92,12 @@ void evidence_add_torque(evidence_t *evidence, float commanded, float measured)
     torque->commanded += commanded * commanded;
     torque->measured += measured * measured;
     torque->product += commanded * measured;
+    torque->other += OTHER_SHARE * (((measured - commanded) * (measured - commanded)) - torque->other);
+}
+
+bool evidence_has_other_torque(const evidence_t *evidence)
+{
+    return evidence->torque.other > OTHER_LEAST;
 }
 
 void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time)
@@ -240,6 +248,8 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     judge_motor(evidence, period, setup->settings->sample_period);
     judge_noise(evidence, block);
     judge_states(evidence, cdkf, block);
+    (void)evidence_set(evidence, EVIDENCE_STICKING,
+        sticking_judge(&evidence->sticking, evidence->motion.slow, cdkf->output_noise[1], moves));
     (void)evidence_set(evidence, EVIDENCE_COLOUR, whiteness_correlation(&evidence->whiteness));
     if (adapts && moves && !block->held &&
         (evidence->ratio[EVIDENCE_BASE] < DOUBT)) { /* of an arm that has changed meanwhile it would say the same */

@@ -19,6 +19,7 @@
 #include "filter/calibration.h"
 #include "filter/cdkf.h"
 #include "filter/change_detection.h"
+#include "filter/sticking.h"
 #include "filter/trim.h"
 #include "filter/whiteness.h"
 
@@ -39,6 +40,7 @@ typedef struct agreement {
     float commanded;
     float measured;
     float product;
+    float other; /* mean square of what the motor was not asked for, over the last seconds in which it was measured */
 } agreement_t;
 
 typedef struct motion {
@@ -64,6 +66,7 @@ typedef struct evidence {
     agreement_t torque;
     change_detection_t change;
     whiteness_t whiteness;
+    sticking_t sticking;
     calibration_t calibration;
     hands_t hands;
     grip_force_t force;
@@ -122,6 +125,9 @@ bool evidence_refuses_output(evidence_t *evidence, const cdkf_t *cdkf, uint32_t 
 /* A measured torque and the one that was commanded before it [N m]; one sample in EVIDENCE_TORQUE_EVERY is enough. */
 enum { EVIDENCE_TORQUE_EVERY = 8 };
 void evidence_add_torque(evidence_t *evidence, float commanded, float measured);
+
+/* Whether the torque may be other than the commanded one where it is not measured: somebody else was driving. */
+bool evidence_has_other_torque(const evidence_t *evidence);
 
 /* After the update: nis / nis_size of the sample. */
 void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time);

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stddef.h>
 
-#define MISSING 10.0f     /* process noise for a base acceleration that is missing, in those that are set, */
+#define MISSING 10.0f     /* process noise for a base acceleration or torque that is missing, in those that are set, */
 #define WRONG 3.0f        /* and for a wrong one, so that it is noticed when it is right again */
 #define UNSETTLED 4.0f    /* innovations while levels settle, in squares: as much larger as they may be */
 #define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
@@ -21,8 +21,8 @@ static float friction(float rate)
 }
 
 /* What a unit of each considered error takes from the inputs (filter/cdkf.h): true = measured / (1 + gain error), true
- * = measured later by the delay, in sample periods. `stop`: friction of a newton metre, high-passed like any torque. The
- * hand is driven by z_ddot + c_space z_dot, both wrong alike. */
+ * = measured later by the delay, in sample periods. `stop`: friction of a newton metre at mid-step, high-passed like any
+ * torque. The hand is driven by z_ddot + c_space z_dot, both wrong alike. */
 static void considered_errors(const estimator_t *estimator, float z_ddot, float stop, float error[CDKF_CONSIDERED])
 {
     const setup_t *setup = &estimator->setup;
@@ -44,18 +44,22 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     const lever_settings_t *s = setup->settings;
     const bool wrong = evidence_has(&learning->evidence, EVIDENCE_BASE);
     const bool unknown = (estimator->base_missing > 0.0f) || wrong;
+    const bool driven = (estimator->torque_missing > 0.0f); /* by a torque that is not known */
     const bool steps = (cdkf->acting > (uint32_t)CDKF_STEP);
-    float input[] = {friction(trim->origin[1] + cdkf->x[1]), z_ddot, tau_m, 1.0f}; /* as in enum trim_signal */
+    const float rate = trim->origin[1] + cdkf->x[1];
+    const float half_change = 0.5f * (rate - estimator->last_rate); /* friction is that of mid-step, not a sample late */
+    float input[] = {friction(rate + half_change), z_ddot, tau_m, 1.0f}; /* as in enum trim_signal */
+    estimator->last_rate = rate;
     trim_inputs(trim, input, TRIM_FRICTION, steps ? 4u : 3u, period);
     const float stop = input[0];
     const float next_z_ddot = input[1];
-    const float next_tau_m = input[2] - (s->lever_friction * stop);
+    const float next_tau_m = input[2];
     float error[CDKF_CONSIDERED];
     cdkf_grip_t grip;
     trim_set_origin(trim);
     model_step_t step = {.period = period,
         .z_ddot = 0.5f * (estimator->z_ddot + next_z_ddot),
-        .tau_m = 0.5f * (estimator->tau_m + next_tau_m),
+        .tau_m = (0.5f * (estimator->tau_m + next_tau_m)) - (s->lever_friction * stop),
         .origin = trim->origin[0],
         .trim = trim_angle(trim),
         .trim_sine = estimator->trim_sine_cosine.sine,
@@ -67,6 +71,8 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     if (unknown) {
         step.z_ddot = 0.0f;
         step.seat_dot = 0.0f;
+    }
+    if (unknown || driven) {
         cdkf->disturbance = (wrong ? WRONG : MISSING) * s->theta_dot_process_noise;
     }
     considered_errors(estimator, next_z_ddot, stop, error);
@@ -75,7 +81,7 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
         cdkf->x[0] += period * (error[CDKF_STEP] * trim->begin_rate);
     }
     const bool gripped =
-        grip_force_step(&learning->evidence.force, setup, trim, unknown ? NULL : force, &step, alone, error, &grip);
+        grip_force_step(&learning->evidence.force, setup, trim, (unknown || driven) ? NULL : force, &step, alone, error, &grip);
     if (gripped) {
         grip.learn =
             !estimator->frozen && learning_informs(learning) && !evidence_has(&learning->evidence, EVIDENCE_REST);
@@ -111,13 +117,13 @@ static void cross_gap(
     }
 }
 
-/* After an outage of the base its level has to settle again. */
-static void follow_base(estimator_t *estimator, bool valid, float elapsed)
+/* Returns for how long an input has been missing. After an outage its level has to settle again. */
+static float follow_input(trim_t *trim, bool valid, float missing, float elapsed)
 {
-    if (valid && (estimator->base_missing > TRIM_OUTAGE)) {
-        trim_unsettle(&estimator->trim);
+    if (valid && (missing > TRIM_OUTAGE)) {
+        trim_unsettle(trim);
     }
-    estimator->base_missing = valid ? 0.0f : (estimator->base_missing + elapsed);
+    return valid ? 0.0f : (missing + elapsed);
 }
 
 /* An output far from what is expected is not valid. */
@@ -146,7 +152,8 @@ void prediction_advance(
         period = elapsed / (float)substeps;
         cross_gap(estimator, sample, last, period, substeps);
     }
-    follow_base(estimator, sample->base, elapsed);
+    estimator->base_missing = follow_input(&estimator->trim, sample->base, estimator->base_missing, elapsed);
+    estimator->torque_missing = follow_input(&estimator->trim, sample->torque, estimator->torque_missing, elapsed);
     predict(estimator, sample->z_ddot, sample->tau_m, sample->gripped ? &sample->grip_force : NULL, period);
     refuse_spikes(estimator, sample, elapsed);
     if (subtract_trim(estimator, sample->y, sample->valid, period)) {

@@ -1,4 +1,5 @@
 /* The table of settings: lever_settings.def as rows, to read, to take the defaults from and to check against. */
+#include "app/delay_line.h"
 #include "lever_cdkf.h"
 #include "math/crc32.h"
 
@@ -70,12 +71,14 @@ static const char *settings_check(const lever_settings_t *settings)
 /* The name of the first setting that does not go with another, or NULL. Through a gap the high-pass behind trim_corner
  * is stepped in SUBSTEPS_MOST parts of it (prediction.c), 12, each of an angle of 2 pi product / 12, with the product of
  * both. The sections lose accuracy as that angle grows; at a product of 1.5, +-2 sigma still cover 97 %. A gap_limit of
- * less than two sample periods takes a late sample for a gap, and aligns for ever. */
+ * less than two sample periods takes a late sample for a gap, and aligns for ever. The delay has to fit into its line. */
 static const char *combination_check(const lever_settings_t *settings)
 {
+    const bool late = (settings->z_ddot_delay > ((float)DELAY_LINE_MOST * settings->sample_period));
     const bool fits = ((settings->gap_limit * settings->trim_corner) <= 1.5f) &&
                       (settings->gap_limit >= (2.0f * settings->sample_period));
-    return fits ? NULL : "gap_limit";
+    const char *wrong = late ? "z_ddot_delay" : NULL;
+    return fits ? wrong : "gap_limit";
 }
 
 const char *lever_config_check(const lever_config_t *config)

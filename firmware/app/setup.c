@@ -1,10 +1,12 @@
 #include "app/setup.h"
 
+#include "math/bounds.h"
 #include "math/trigonometry.h"
 
 #include <stddef.h>
 
 #define TURN 6.28318531f
+#define DELAY_WHOLE 0.99f /* a delay is rounded up, but for a hundredth of a sample */
 
 const model_t *setup_model(uint8_t model)
 {
@@ -30,6 +32,9 @@ void setup_choose(setup_t *setup)
     constants->trim = (setup->preload == (uint8_t)LEVER_PRELOAD_TRIM);
     setup->base_scale = 1.0f / s->z_ddot_gain;
     setup->torque_scale = 1.0f / s->tau_m_gain;
+    const float delay = s->z_ddot_delay / s->sample_period;
+    setup->delay_samples = (uint8_t)(delay + DELAY_WHOLE);
+    setup->delay_rest = greater((float)setup->delay_samples - delay, 0.0f);
     const bool seated = (setup->model == (uint8_t)LEVER_MODEL_LEVER) && (s->seat_frequency > 0.0f);
     const float seat = seated ? (TURN * s->seat_frequency) : 0.0f;
     constants->seat_stiffness = seat * seat;

@@ -22,8 +22,7 @@ float whiteness_correlation(const whiteness_t *whiteness)
     for (uint32_t k = 0u; k < LAGS; k++) {
         largest = greater(fabsf(whiteness->product[k]), largest);
     }
-    const bool told = (whiteness->time >= TIME_MIN) && (whiteness->variance > 0.0f); /* something moves */
-    return told ? (largest / whiteness->variance) : 0.0f;
+    return (whiteness->time >= TIME_MIN) ? (largest / greater(whiteness->variance, whiteness->expected)) : 0.0f;
 }
 
 void whiteness_end_block(whiteness_t *whiteness)
@@ -32,6 +31,7 @@ void whiteness_end_block(whiteness_t *whiteness)
     whiteness->time = lesser(whiteness->time + whiteness->elapsed, MEMORY);
     const float share = whiteness->elapsed / whiteness->time;
     whiteness->variance += share * ((sum * sum) - whiteness->variance);
+    whiteness->expected += share * (whiteness->count - whiteness->expected);
     for (uint32_t k = 0u; k < LAGS; k++) {
         whiteness->product[k] += share * ((sum * whiteness->before[k]) - whiteness->product[k]);
     }
@@ -40,5 +40,6 @@ void whiteness_end_block(whiteness_t *whiteness)
     }
     whiteness->before[0] = sum;
     whiteness->sum = 0.0f;
+    whiteness->count = 0.0f;
     whiteness->elapsed = 0.0f;
 }

@@ -358,7 +358,7 @@ TEST(the_verdict_on_the_torque_waits_until_enough_is_asked)
         const float product = row[i].gain * row[i].asked;
         setUp();
         config.settings.sample_period = row[i].sample_period;
-        evidence.torque = (agreement_t){row[i].asked, row[i].gain * product, product};
+        evidence.torque = (agreement_t){row[i].asked, row[i].gain * product, product, 0.0f};
         evidence_note(&evidence, EVIDENCE_MOTOR, row[i].before);
         end_block();
         TEST_ASSERT_EQUAL(row[i].is, evidence_has(&evidence, EVIDENCE_MOTOR));

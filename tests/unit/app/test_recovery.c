@@ -202,6 +202,7 @@ TEST(a_rate_that_is_none_has_no_friction)
         *level = nothing;
         lever->estimator.trim.origin[1] = 0.0f;
         cdkf->x[1] = rates[i];
+        lever->estimator.last_rate = rates[i];
         (void)run(1u);
         TEST_ASSERT_EQUAL(i == 0u, level->section[0].level > 0.0f);
         TEST_ASSERT_FALSE(isnan(level->section[0].level));

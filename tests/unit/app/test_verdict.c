@@ -15,6 +15,7 @@ static const verdict_row_t expected[VERDICT_COUNT] = {
     [VERDICT_MOTOR_WRONG] = {0u, NEVER, RUNNING, SOUND, false, false, ACTION_RESTORE, 0u},
     [VERDICT_HANDS_OFF] = {0u, NEVER, NEVER, NEVER, false, false, ACTION_RESTORE, ACTION_OPEN},
     [VERDICT_SENSOR_WRONG] = {0u, ALWAYS, RUNNING, SOUND, false, false, ACTION_RESTORE, 0u},
+    [VERDICT_STICKING] = {0u, ALWAYS, RUNNING, SOUND, false, false, ACTION_OPEN, 0u},
     [VERDICT_NOISE] = {0u, ALWAYS, RUNNING, SOUND, false, false, ACTION_RESTORE, 0u},
     [VERDICT_BLIND] = {0u, ALWAYS, RUNNING, SOUND, false, false, 0u, 0u},
     [VERDICT_SETTLING] = {0u, ALWAYS, RUNNING, SOUND, false, false, 0u, 0u},
