@@ -61,7 +61,6 @@ class Start:
     state_factor: Array  # (2, 2)
     trim: float  # [rad]
     input: tuple[float, float] = (0.0, 0.0)  # z̈ [m/s²], τ_m [N m] at that sample, compensated
-    measured_base: float = 0.0  # z̈ as the sensor shows it
     time: float = 0.0  # [s]
 
 
@@ -114,12 +113,12 @@ class Estimator:
         self.refused = [seconds(0.0), seconds(0.0)]  # time for which θ, θ̇ have been spikes
         self.missing = [seconds(0.0), seconds(0.0)]  # time since the last sample of θ, of θ̇
         self.last_output = [0.0, 0.0]
-        self.base_missing = seconds(0.0)
+        self.base_missing, self.torque_missing = seconds(0.0), seconds(0.0)
         self._wait_for_levels()
         self.last_raw = start.input
         self.last_input = start.input  # the same, as deviations in preload trim
         self.velocity = 0.0  # of the base [m/s]
-        self.last_measured_base = start.measured_base
+        self.last_rate = 0.0  # of the lever at the beginning of the last step [rad/s]
         self.time = start.time
 
     # --- one sample ------------------------------------------------------------------------------------------------
@@ -132,17 +131,21 @@ class Estimator:
         u: tuple[float, float],
         base_valid: bool = True,
         force: float | None = None,
+        torque_valid: bool = True,
     ) -> None:
         """Take the sample at `time` [s]: outputs y = [θ, θ̇] of which those flagged are used, inputs u = (z̈, τ_m)
-        and the grip force [N] as the sensors show them."""
+        and the grip force [N] as the sensors show them. A torque that is not valid is not known: the motor has another
+        master."""
         duration = time - self.time
         self.unsettled -= counted(duration)
         substeps = min(max(1, round(duration / self.settings["sample_period"])), MOST_SUBSTEPS)
         dt, none_valid = duration / substeps, np.zeros(2, np.bool_)
-        inputs = (self._true_base(u[0], duration, base_valid), u[1] / self.settings["tau_m_gain"])
+        base = u[0] / self.settings["z_ddot_gain"] if base_valid else self.last_raw[0]
+        inputs = (base, u[1] / self.settings["tau_m_gain"] if torque_valid else self.last_raw[1])
         for i in range(1, substeps + 1):
             if i == substeps:
-                self._follow_base(base_valid, duration)
+                self.base_missing = self._follow(base_valid, self.base_missing, duration)
+                self.torque_missing = self._follow(torque_valid, self.torque_missing, duration)
             share = i / substeps
             last = self.last_raw
             between = (last[0] + share * (inputs[0] - last[0]), last[1] + share * (inputs[1] - last[1]))
@@ -160,7 +163,7 @@ class Estimator:
     def _correct(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
         """Measurement update, and learning when it is due."""
         excited = self._is_excited()
-        measured = self._is_settled() and bool(valid.any()) and bool(self.base_missing <= 0.0)
+        measured = self._is_settled() and bool(valid.any()) and self._knows_inputs()
         self.nis = 0.0
         if valid.any():
             noise = np.diag(self.learning.noise.output_noise)
@@ -202,33 +205,33 @@ class Estimator:
         spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
         return spikes
 
-    def _true_base(self, measured: float, duration: float, valid: bool) -> float:
-        """By a sensor that shows gain times the base acceleration, late by a delay; the last one when not valid."""
-        if not valid:
-            return self.last_raw[0]
-        slope = (measured - self.last_measured_base) / duration
-        self.last_measured_base = measured
-        return (measured + self.settings["z_ddot_delay"] * slope) / self.settings["z_ddot_gain"]
-
-    def _follow_base(self, valid: bool, duration: float) -> None:
-        """Its level has to settle again after an outage."""
-        if valid and self.base_missing > OUTAGE:
+    def _follow(self, valid: bool, missing: np.float32, duration: float) -> np.float32:
+        """Return for how long an input has been missing [s]. Its level has to settle again after an outage."""
+        if valid and missing > OUTAGE:
             self._wait_for_levels()
-        self.base_missing = seconds(0.0) if valid else self.base_missing + counted(duration)
+        return seconds(0.0) if valid else missing + counted(duration)
+
+    def _knows_inputs(self) -> bool:
+        return bool(self.base_missing <= 0.0 and self.torque_missing <= 0.0)
 
     def _advance(self, raw: tuple[float, float], force: float | None, dt: float) -> None:
-        """One prediction, with the mean of the inputs at both ends. A base that is not known is noise."""
+        """One prediction, with the mean of the inputs at both ends and the friction of the rate halfway, on a straight
+        line from the last step's. A base that is not known is noise."""
         rate = float(self.origin[1] + self.belief.x[1])
-        stop = self._deviation(self.inputs[2], rate / (abs(rate) + STOP_RATE), dt)
+        halfway, self.last_rate = rate + 0.5 * (rate - self.last_rate), rate
+        stop = self._deviation(self.inputs[2], halfway / (abs(halfway) + STOP_RATE), dt)
         base, torque = (self._deviation(detrend, value, dt) for detrend, value in zip(self.inputs, raw, strict=False))
-        u, last = (base, torque - self.settings["lever_friction"] * stop), self.last_input
+        u, last = (base, torque), self.last_input
         if self.detrended:
             self.origin = np.array([detrend.level for detrend in self.outputs])
         z_ddot = 0.5 * (base + last[0])
-        mean, z_dot = (z_ddot, 0.5 * (u[1] + last[1])), self.velocity + 0.5 * dt * z_ddot
+        torque = 0.5 * (u[1] + last[1]) - self.settings["lever_friction"] * stop
+        mean, z_dot = (z_ddot, torque), self.velocity + 0.5 * dt * z_ddot
         self.velocity = VELOCITY_KEPT * z_dot + 0.5 * dt * z_ddot
         if self.base_missing > 0.0:
-            z_ddot, z_dot, force = 0.0, 0.0, None
+            z_ddot, z_dot = 0.0, 0.0
+        if not self._knows_inputs():
+            force = None
             self.learning.disturbance = UNKNOWN * self.settings["theta_dot_process_noise"]
         # true less taken input, where measured = (1 + gain error) true and measured(t) = true(t - delay)
         slope = (base - last[0]) / dt
@@ -248,7 +251,7 @@ class Estimator:
         x, p = self.belief.x + angle, self.scale.physical(self.belief.w)
         pushed, unpushed = (self.model.step(x, p, (u[0], torque, 0.0), self.trim, dt)[1] for torque in (1.0, 0.0))
         kick = -1.0 / (float(pushed - unpushed) * grip.lever.length)
-        learn = bool(self._is_settled() and self._is_excited() and self.base_missing <= 0.0)
+        learn = self._is_settled() and self._is_excited() and self._knows_inputs()
         return Force(seen[0], grip.noise(dt), lambda a, b: grip.expected(a, b, dt), kick, seen[1], learn)
 
     def _deviation(self, detrend: Detrend, value: float, dt: float) -> float:
@@ -402,23 +405,45 @@ class Estimator:
 # --- a whole run -----------------------------------------------------------------------------------------------------
 
 
+def met(samples: Mapping[str, Array], settings: Mapping[str, float]) -> dict[str, Array]:
+    """Return the samples with all but z̈ earlier by the delay of its sensor, rounded up to whole periods; the rest of the
+    delay is between two samples of z̈. Where nothing is early enough, nothing is valid."""
+    exact = settings["z_ddot_delay"] / settings["sample_period"]
+    late = math.ceil(exact - 0.01)
+    if late == 0:
+        return dict(samples)
+    time, base, period = samples["time_s"], samples["z_ddot"], settings["sample_period"]
+    wanted = time - late * period
+    source = np.clip(np.searchsorted(time, wanted - 0.5 * period), 0, len(time) - 1)
+    there = np.abs(time[source] - wanted) < 0.5 * period
+    kept = ("time_s", "z_ddot", "z_ddot_valid")
+    moved = {name: values if name in kept else values[source] * there for name, values in samples.items()}
+    moved["tau_m_valid"] = there
+    rest = np.minimum((late - exact) * period / np.diff(time, prepend=time[0] - period), 1.0)
+    moved["z_ddot"] = base - rest * np.diff(base, prepend=base[:1])
+    return moved
+
+
 def align(samples: Mapping[str, Array], settings: Mapping[str, float]) -> tuple[Start, int]:
     """Where the firmware starts after `align_time`, and how many samples that took (at least one).
 
     The trim is the mean angle; the state is the last sample, as uncertain as its noise. Raise ValueError if that
     sample is not valid, for then the firmware goes on aligning.
     """
+    samples = met(samples, settings)
     time = samples["time_s"]
-    last = int(np.searchsorted(time, time[0] + settings["align_time"] - 0.5 * settings["sample_period"]))
+    first = int(np.argmax(samples["theta_valid"].astype(bool) | samples["theta_dot_valid"].astype(bool)))
+    last = int(np.searchsorted(time, time[first] + settings["align_time"] - 0.5 * settings["sample_period"]))
     if not (samples["theta_valid"][last] and samples["theta_dot_valid"][last]):
         raise ValueError(f"align: theta or theta_dot is not valid at {time[last]} s, the end of align_time")
     theta = samples["theta"][: last + 1][samples["theta_valid"][: last + 1].astype(bool)]
     state = np.array((samples["theta"][last], samples["theta_dot"][last]))
     factor = np.diag((settings["theta_noise"], settings["theta_dot_noise"]))
-    base, before = (float(samples["z_ddot"][k]) for k in (last, max(last - 1, 0)))
-    late = settings["z_ddot_delay"] * (base - before) / (float(time[last] - time[last - 1]) if last else 1.0)
-    inputs = ((base + late) / settings["z_ddot_gain"], float(samples["tau_m"][last]) / settings["tau_m_gain"])
-    return Start(state, factor, float(theta.mean()), inputs, base, float(time[last])), last + 1
+    inputs = (
+        float(samples["z_ddot"][last]) / settings["z_ddot_gain"],
+        float(samples["tau_m"][last]) / settings["tau_m_gain"],
+    )
+    return Start(state, factor, float(theta.mean()), inputs, float(time[last])), last + 1
 
 
 def columns(estimator: Estimator) -> tuple[str, ...]:
@@ -439,14 +464,17 @@ def run(estimator: Estimator, samples: Mapping[str, Array], first: int = 0, ever
     (N,); an invalid tau_m must already be 0. grip_force [N] may be missing, or NaN.
     """
     rows = []
+    samples = met(samples, estimator.settings)
     y = np.column_stack((samples["theta"], samples["theta_dot"]))
     valid = np.column_stack((samples["theta_valid"], samples["theta_dot_valid"])).astype(bool)
     base_valid = samples["z_ddot_valid"].astype(bool).tolist()
     time, base, torque = (samples[name].tolist() for name in ("time_s", "z_ddot", "tau_m"))
+    torque_valid = samples.get("tau_m_valid", np.ones(len(time), np.bool_)).astype(bool).tolist()
     forces = samples.get("grip_force", np.full(len(time), math.nan)).tolist()
     for index in range(first, len(time)):
         force = None if math.isnan(forces[index]) else forces[index]
-        estimator.step(time[index], y[index], valid[index], (base[index], torque[index]), base_valid[index], force)
+        inputs = (base[index], torque[index])
+        estimator.step(time[index], y[index], valid[index], inputs, base_valid[index], force, torque_valid[index])
         if (index - first) % every == 0:
             x = (estimator.origin + estimator.belief.x, estimator.state_deviations())
             others = (*estimator.parameters(), *estimator.dynamics(), (estimator.rest, estimator.nis))
