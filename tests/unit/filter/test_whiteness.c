@@ -59,6 +59,21 @@ TEST(every_lag_of_20_to_80_ms_is_seen)
     }
 }
 
+/* Sensors that are quieter than stated: what is left is coloured, but smaller than what was expected. A tenth of the
+ * standard deviation, wholly coloured, is a hundredth of the variance of a sample and, as 20 of them add up, a fifth of a
+ * sum's: no more than 0.35 of it. Three tenths are 1.8 of it. */
+TEST(innovations_smaller_than_expected_count_by_what_is_expected)
+{
+    for (uint32_t tenths = 1u; tenths <= 3u; tenths += 2u) {
+        setUp();
+        for (uint32_t k = 0u; k < 20000u; k++) {
+            whiteness_add(&whiteness, 0.1f * (float)tenths, PERIOD);
+        }
+        const float expected = (tenths == 1u) ? 0.2f : 1.0f;
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, expected, whiteness_correlation(&whiteness));
+    }
+}
+
 /* However many samples make a block of 20 ms. */
 TEST(the_first_two_seconds_say_nothing)
 {
