@@ -156,7 +156,7 @@ typedef struct lever_sample {
     uint32_t time_us; /* sample time [us], wraps at 2^32 */
     float theta;      /* lever angle from the floor [rad] */
     float theta_dot;  /* lever rate [rad/s] */
-    float tau_m;      /* motor torque on the lever [N m]; when not valid, what was asked for is used */
+    float tau_m;      /* motor torque on the lever [N m]; when not valid, what was asked for is used, unless another drove */
     float
         z_ddot; /* base vertical acceleration, up positive, without gravity [m/s^2]; when not valid, the last is held */
     float grip_force; /* of the hand on the lever, across it, positive where it raises theta: mean since the last sample
@@ -213,7 +213,7 @@ bool lever_command(lever_t *lever, const lever_command_t *command);
 enum lever_parameter_limits { LEVER_PARAMETERS = 3 };
 
 typedef struct lever_estimate {
-    uint32_t time_us; /* of the sample that this belongs to [us] */
+    uint32_t time_us; /* of what this is the estimate of: the last sample, less z_ddot_delay in whole samples [us] */
     float theta;      /* lever angle [rad] and its standard deviation */
     float theta_sigma;
     float theta_dot; /* lever rate [rad/s] and its standard deviation */
@@ -346,7 +346,7 @@ enum lever_fault {
     LEVER_FAULT_CLOCK = 4096,       /* the sample clock stands, runs backwards or crawls (a quarter of sample_period) */
     LEVER_FAULT_DUPLICATE = 8192,   /* another estimator has spoken on this bus within the last 2 s */
     LEVER_FAULT_SETTLING = 16384,   /* nothing is learnt: the levels of the signals have not settled yet */
-    LEVER_FAULT_MISMATCH = 32768,   /* innovations are not white: something moves the lever that the model lacks */
+    LEVER_FAULT_MISMATCH = 32768,   /* innovations are not white, or the lever sticks: something that the model lacks */
     LEVER_FAULT_CALIBRATION = 65536, /* torque, base and grip force do not agree on the pilot */
     LEVER_FAULT_HANDS_OFF = 131072   /* nobody holds the lever; nothing is learnt */
 };

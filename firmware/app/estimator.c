@@ -214,7 +214,8 @@ static bool note_states(estimator_t *estimator, const checked_t *sample)
     const lever_settings_t *s = estimator->setup.settings;
     const bool measured = sample->valid[0] || sample->valid[1];
     const bool rests = evidence_is_at_rest(evidence, s->excitation_least, estimator->cdkf.output_noise[1]);
-    evidence_note(evidence, EVIDENCE_MISSING, !measured || (estimator->base_missing > 0.0f) || (estimator->torque_missing > 0.0f));
+    evidence_note(evidence, EVIDENCE_MISSING,
+        !measured || (estimator->base_missing > 0.0f) || (estimator->torque_missing > 0.0f));
     evidence_note(evidence, EVIDENCE_UNSETTLED, estimator->trim.unsettled >= (0.5f * s->sample_period));
     evidence_note(evidence, EVIDENCE_REST, rests);
     note(estimator, rests, LEVER_FAULT_EXCITATION);
@@ -337,7 +338,8 @@ enum lever_mode estimator_update(estimator_t *estimator, const lever_sample_t *s
         checked_t checked;
         lever_sample_t met = *sample;
         float commanded = commanded_torque;
-        delay_line_pass(&estimator->line, estimator->setup.delay_samples, periods_in(estimator, elapsed), &met, &commanded);
+        delay_line_pass(
+            &estimator->line, estimator->setup.delay_samples, periods_in(estimator, elapsed), &met, &commanded);
         check(estimator, &met, commanded, elapsed, &checked);
         estimator->late_series_us = 0u;
         if (started && !new_clock) {

@@ -53,15 +53,15 @@ typedef struct estimator {
     uint32_t time_us;      /* of the last sample */
     uint32_t late_time_us; /* of the last late one, and by how much such samples have advanced */
     uint32_t late_series_us;
-    float raw_z_ddot;   /* as it came last [m/s^2] */
-    float base_missing; /* time since the base acceleration was valid last [s] */
+    float raw_z_ddot;     /* as it came last [m/s^2] */
+    float base_missing;   /* time since the base acceleration was valid last [s] */
     float torque_missing; /* likewise the torque, while it may be other than the commanded one [s] */
     seat_t seat;
     float last_z_ddot; /* inputs, compensated for what is known of the sensors, at the seat [m/s^2], [N m] */
     float last_tau_m;
     float z_ddot; /* the same as the model takes them: deviations in preload trim */
     float tau_m;
-    float last_rate; /* of the lever at the begin of the last step [rad/s] */
+    float last_rate;           /* of the lever at the begin of the last step [rad/s] */
     base_motion_t base_motion; /* what follows from that */
     float restarts;            /* of the filter, those of more than some 10 s ago forgotten */
     float nis;                 /* of the last sample */

@@ -47,7 +47,8 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     const bool driven = (estimator->torque_missing > 0.0f); /* by a torque that is not known */
     const bool steps = (cdkf->acting > (uint32_t)CDKF_STEP);
     const float rate = trim->origin[1] + cdkf->x[1];
-    const float half_change = 0.5f * (rate - estimator->last_rate); /* friction is that of mid-step, not a sample late */
+    const float half_change =
+        0.5f * (rate - estimator->last_rate); /* friction is that of mid-step, not a sample late */
     float input[] = {friction(rate + half_change), z_ddot, tau_m, 1.0f}; /* as in enum trim_signal */
     estimator->last_rate = rate;
     trim_inputs(trim, input, TRIM_FRICTION, steps ? 4u : 3u, period);
@@ -80,8 +81,8 @@ static void predict(estimator_t *estimator, float z_ddot, float tau_m, const flo
     if (steps) {
         cdkf->x[0] += period * (error[CDKF_STEP] * trim->begin_rate);
     }
-    const bool gripped =
-        grip_force_step(&learning->evidence.force, setup, trim, (unknown || driven) ? NULL : force, &step, alone, error, &grip);
+    const bool gripped = grip_force_step(
+        &learning->evidence.force, setup, trim, (unknown || driven) ? NULL : force, &step, alone, error, &grip);
     if (gripped) {
         grip.learn =
             !estimator->frozen && learning_informs(learning) && !evidence_has(&learning->evidence, EVIDENCE_REST);

@@ -14,14 +14,14 @@ typedef struct setup {
     const lever_settings_t *settings; /* the caller's */
     const model_t *model_in_use;
     model_constants_t constants;
-    float base_scale;   /* true over measured base acceleration, */
-    float torque_scale; /* and torque */
-    float delay_rest;   /* by which the accelerometer is less late than delay_samples, in sample periods */
+    float base_scale;      /* true over measured base acceleration, */
+    float torque_scale;    /* and torque */
+    float delay_rest;      /* by which the accelerometer is less late than delay_samples, in sample periods */
     uint8_t delay_samples; /* that the other signals are delayed by */
-    uint8_t model;      /* enum lever_model; commands change this and the following */
-    uint8_t preload;    /* enum lever_preload */
-    uint8_t estimator;  /* enum lever_estimator */
-    uint8_t adaptation; /* enum lever_adaptation */
+    uint8_t model;         /* enum lever_model; commands change this and the following */
+    uint8_t preload;       /* enum lever_preload */
+    uint8_t estimator;     /* enum lever_estimator */
+    uint8_t adaptation;    /* enum lever_adaptation */
 } setup_t;
 
 /* The model of an enum lever_model; NULL when there is none. */

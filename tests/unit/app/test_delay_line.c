@@ -50,7 +50,8 @@ static void check_is(uint32_t number, const lever_sample_t *sample, float comman
 
 static void check_nothing_is_valid(const lever_sample_t *sample)
 {
-    TEST_ASSERT_FALSE(sample->theta_valid || sample->theta_dot_valid || sample->tau_m_valid || sample->grip_force_valid);
+    TEST_ASSERT_FALSE(
+        sample->theta_valid || sample->theta_dot_valid || sample->tau_m_valid || sample->grip_force_valid);
 }
 
 /* Time and base acceleration are those of now; the rest comes out `length` samples later, and before that nothing does. */

@@ -255,6 +255,66 @@ TEST(the_first_base_acceleration_is_taken_as_it_is_whatever_the_delay)
     TEST_ASSERT_EQUAL_FLOAT(2.0f, lever->estimator.last_z_ddot);
 }
 
+/* All but the base is held back by the delay, rounded up to whole samples: the estimate says of when it is. */
+TEST(an_estimate_is_of_the_time_that_a_late_accelerometer_shows)
+{
+    static const struct {
+        float delay; /* [s] */
+        uint32_t late_us;
+    } row[] = {{0.0f, 0u}, {0.9e-3f, 1000u}, {1.0e-3f, 1000u}, {1.1e-3f, 2000u}, {9.5e-3f, 10000u}, {1.0e-2f, 10000u}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        float theta[12];
+        config.settings.z_ddot_delay = row[i].delay;
+        start();
+        for (uint32_t k = 0u; k < 500u; k++) {
+            const lever_sample_t sample = sample_after(1u);
+            theta[k % 12u] = sample.theta;
+            (void)lever_update(lever, &sample);
+        }
+        const lever_estimate_t now = estimate();
+        TEST_ASSERT_EQUAL_UINT32(time_us - row[i].late_us, now.time_us);
+        TEST_ASSERT_FLOAT_WITHIN(4.0f * 1.0e-3f, theta[(499u - (row[i].late_us / 1000u)) % 12u], now.theta);
+        TEST_ASSERT_EQUAL_FLOAT(theta[(499u - (row[i].late_us / 1000u)) % 12u],
+            lever->estimator.learning.evidence.stillness[SIGNAL_THETA].now);
+    }
+}
+
+/* What is left of a delay lies between two samples of the base: a ramp of it comes out where it is. */
+TEST(a_delay_between_two_samples_is_on_the_line_between_them)
+{
+    config.settings.z_ddot_delay = 1.25e-3f;
+    start();
+    for (uint32_t k = 0u; k < 100u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        sample.z_ddot = 0.1f * (float)k;
+        (void)lever_update(lever, &sample);
+    }
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, 0.1f * (99.0f - 0.75f), lever->estimator.last_z_ddot);
+}
+
+/* Half of the torque samples are missing. Where somebody else has driven the motor, the torque is then not known, and nothing is
+ * learnt from it; where the motor did what it was asked, it still does. */
+TEST(a_missing_torque_is_unknown_where_somebody_else_was_driving)
+{
+    for (uint32_t other_drives = 0u; other_drives <= 1u; other_drives++) {
+        setUp();
+        simulation.torque_rms = (other_drives == 1u) ? 0.5 : 0.0;
+        (void)run(2000u);
+        for (uint32_t k = 0u; k < 30u; k++) { /* longer than an outage */
+            lever_sample_t sample = sample_after(1u);
+            invalidate(&sample, 2u);
+            const float last = lever->estimator.last_tau_m;
+            (void)lever_update(lever, &sample);
+            TEST_ASSERT_EQUAL_FLOAT((other_drives == 1u) ? last : 0.0f, lever->estimator.last_tau_m);
+            TEST_ASSERT_EQUAL(other_drives == 1u, evidence_has(&lever->estimator.learning.evidence, EVIDENCE_MISSING));
+        }
+        TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_TORQUE));
+        (void)run(1u);
+        TEST_ASSERT_FALSE(evidence_has(&lever->estimator.learning.evidence, EVIDENCE_MISSING));
+        TEST_ASSERT_EQUAL(other_drives == 1u, has_fault(LEVER_FAULT_SETTLING)); /* the level of the torque */
+    }
+}
+
 /* R30 */
 TEST(time_may_wrap_at_2_to_the_32)
 {

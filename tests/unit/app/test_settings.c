@@ -65,6 +65,11 @@ TEST(choices_that_are_not_known_and_settings_that_do_not_go_together_are_named)
     assert_refused("gap_limit");
     config.settings.gap_limit = 0.02f;
     TEST_ASSERT_NULL(lever_config_check(&config));
+    config.settings.sample_period = 5.0e-4f;
+    config.settings.z_ddot_delay = 5.01e-3f; /* more than ten samples */
+    assert_refused("z_ddot_delay");
+    config.settings.z_ddot_delay = 5.0e-3f;
+    TEST_ASSERT_NULL(lever_config_check(&config));
     TEST_ASSERT_NULL(lever_init(NULL, &config));
     TEST_ASSERT_NULL(lever_init(&memory, NULL));
 }
