@@ -156,7 +156,7 @@ typedef struct lever_sample {
     uint32_t time_us; /* sample time [us], wraps at 2^32 */
     float theta;      /* lever angle from the floor [rad] */
     float theta_dot;  /* lever rate [rad/s] */
-    float tau_m;      /* motor torque on the lever [N m]; when not valid, what was asked for is used, unless another drove */
+    float tau_m;      /* motor torque on the lever [N m]; when not valid, the commanded one, unless another drove */
     float
         z_ddot; /* base vertical acceleration, up positive, without gravity [m/s^2]; when not valid, the last is held */
     float grip_force; /* of the hand on the lever, across it, positive where it raises theta: mean since the last sample

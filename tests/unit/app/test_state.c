@@ -278,7 +278,7 @@ TEST(any_bytes_that_are_accepted_break_nothing)
     uint32_t accepted = 0u;
     start_bus();
     fly(20u);
-    for (uint32_t trial = 0u; trial < 3000u; trial++) {
+    for (uint32_t trial = 0u; trial < 6000u; trial++) {
         uint32_t at = FIRST_ROW + 4u; /* behind the checksum of the settings */
         const double share = 1.0 / (double)(1u << (trial % 10u));
         lever_state_save(lever, state);
