@@ -406,8 +406,10 @@ class Estimator:
 
 
 def met(samples: Mapping[str, Array], settings: Mapping[str, float]) -> dict[str, Array]:
-    """Return the samples with all but z̈ earlier by the delay of its sensor, rounded up to whole periods; the rest of the
-    delay is between two samples of z̈. Where nothing is early enough, nothing is valid."""
+    """Return the samples with all but z̈ earlier by the delay of its sensor, in whole periods.
+
+    The rest of the delay lies between two samples of z̈. Where nothing is early enough, nothing is valid.
+    """
     exact = settings["z_ddot_delay"] / settings["sample_period"]
     late = math.ceil(exact - 0.01)
     if late == 0:
