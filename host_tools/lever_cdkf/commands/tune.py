@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     from ..tune.calibration import calibrate
     from ..tune.likelihood import Likelihood
     from ..tune.recording import read
-    from ..tune.search import Search, groups
+    from ..tune.search import Search, change_walk, groups
 
     before = _settings(args)
     with Progress("tune") as progress:
@@ -121,6 +121,7 @@ def run(args: argparse.Namespace) -> int:
                 _note("hardly any motion to learn from (excitation_least): only noise is looked for, and that at rest")
             tuned = search.run(groups(calibrated, args.keep))
             after = {**calibrated, **{entry.name: entry.after for entry in tuned if entry.after != entry.before}}
+            after |= {} if "change_walk" in {*args.keep, *before} else change_walk(before, tuned)
             fits = validation.fits(likelihood, before, after)
     if calibration.is_refused:
         return _refuse(args, likelihood, calibration)
@@ -202,6 +203,9 @@ def _conclude(
     inputs = [*args.log, *input_files(args)]
     origin = provenance(inputs)
     print_tables(tables, args.json, inputs=inputs)
+    if after.get("change_walk") != before.get("change_walk"):
+        longer = f"{after['change_walk']:g}"
+        verdict += f" change_walk becomes {longer} s: with smaller walks, another pilot is followed as fast as before."
     say(f"{_subtitle(args, likelihood)} {verdict} {calibration.text}".rstrip())
     if args.page is not None:
         from ..tune.tune_page import build

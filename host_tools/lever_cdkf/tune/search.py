@@ -88,6 +88,18 @@ def groups(assignments: Assignments, fixed: Sequence[str] = ()) -> dict[str, tup
     return {group: names for group, names in kept.items() if names}
 
 
+def change_walk(assignments: Assignments, tuned: Sequence[Tuned]) -> dict[str, float]:
+    """Return a longer change_walk [s] where a walk has become smaller; nothing otherwise.
+
+    A change of the pilot counts as so much time of the walk at once. An arm that stayed the same makes the walk
+    smaller, but says nothing of how far the next pilot differs: no parameter is to follow him more slowly.
+    """
+    slower = [(each.before / each.after) ** 2 for each in tuned if each.name.endswith("_walk") and each.after > 0.0]
+    now, row = make_config(assignments).settings["change_walk"], setting("change_walk")
+    longer = _bounded("change_walk", min(now * max(slower, default=1.0), row.greatest))
+    return {"change_walk": longer} if longer > now else {}
+
+
 class Search:
     """Looks for the settings under which the log is most likely."""
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lever_cdkf.tune import recording, validation
 from lever_cdkf.tune.likelihood import Likelihood
-from lever_cdkf.tune.search import Search, Tuned, groups
+from lever_cdkf.tune.search import Search, Tuned, change_walk, groups
 from python.tune.conftest import NOISE, WALK, Simulate
 
 
@@ -126,3 +126,23 @@ def test_a_gain_is_clear_beyond_three_standard_errors_and_a_loss_beyond_two(mean
 def test_decision(low: float | None, high: float | None, after: float, verdict: str) -> None:
     found = Tuned("theta_noise", before=1.0, best=3.0, low=low, high=high)
     assert (found.after, found.verdict) == (after, verdict)
+
+
+@pytest.mark.parametrize(
+    ("walks", "expected"),
+    [
+        ({"m_p_walk": 0.0075, "c_p_walk": 0.02}, {}),
+        ({"m_p_walk": 0.015, "c_p_walk": 0.04}, {}),
+        ({"m_p_walk": 0.0075, "c_p_walk": 0.01}, {"change_walk": 200.0}),
+        ({"m_p_walk": 0.0025, "c_p_walk": 0.01}, {"change_walk": 450.0}),
+        ({"k_p_walk": 1e-4}, {"change_walk": 10000.0}),
+    ],
+)
+def test_with_smaller_walks_a_change_counts_as_more_of_them(
+    walks: dict[str, float], expected: dict[str, float]
+) -> None:
+    """50 s by default: half the walk takes four times as long for the same. The setting ends at 10000 s."""
+    usual = {"m_p_walk": 0.0075, "c_p_walk": 0.02, "k_p_walk": 0.02}
+    noise = Tuned("theta_noise", before=1.0, best=0.1, low=0.05, high=0.2)
+    tuned = [Tuned(name, usual[name], value, low=value, high=value) for name, value in walks.items()]
+    assert change_walk({}, [noise, *tuned]) == expected
