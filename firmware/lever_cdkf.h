@@ -131,10 +131,10 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance: 2,336 bytes, and as much more as pointers are longer than 32 bits. */
+/* Room for one instance: 2,320 bytes, and as much more as pointers are longer than 32 bits. */
 typedef struct lever_room {
     const void *pointers[4];
-    uint8_t rest[2320];
+    uint8_t rest[2304];
 } lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
