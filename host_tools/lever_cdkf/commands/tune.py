@@ -38,7 +38,8 @@ and Coulomb friction of the lever (lever_friction), each with its standard devia
 m of dither and 0.1 g of vibration give them within 1 %, 0.3 ms and 0.03 N m. Without dither they cannot be known.
 tau_m_gain cannot be found in a log at all: measure it.
 
-Noise, walks and adaptation are changed only where the log contradicts them (95 % likelihood interval). The last part of
+Noise, walks and adaptation are changed only where the log contradicts them (95 % likelihood interval). Where a walk
+becomes smaller, change_walk becomes longer, so that another pilot is followed as fast as before. The last part of
 the log is held out: the search never sees it, and before and after are compared on it. Noise that the firmware
 estimates while running (noise_window) is off during the search, and on again when it is judged.
 
