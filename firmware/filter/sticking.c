@@ -3,17 +3,11 @@
 #include "math/bounds.h"
 
 #include <math.h>
-#include <string.h>
 
 #define MEMORY 4.0f     /* [s] */
 #define STILL_MOST 1.0f /* a longer standstill is no part of the motion [s] */
 #define PART 0.2f       /* of the rms rate: below it the lever is at standstill */
 #define GAUSSIAN 0.8f   /* sqrt(2 / pi): part of Gaussian motion below a rate, over that rate in standard deviations */
-
-void sticking_start(sticking_t *sticking)
-{
-    (void)memset(sticking, 0, sizeof *sticking);
-}
 
 void sticking_end_block(sticking_t *sticking)
 {

@@ -12,6 +12,7 @@
 
 #define STICKING_BLOCK 0.0195f /* [s] */
 
+/* All of it 0 at the start. */
 typedef struct sticking {
     float sum;     /* of the rates of this block [rad/s] */
     float count;   /* of them */
@@ -22,8 +23,6 @@ typedef struct sticking {
     float time;    /* that the excess is of, up to its memory [s] */
     float excess;  /* mean part of the time at standstill over that of Gaussian motion, less 1 */
 } sticking_t;
-
-void sticking_start(sticking_t *sticking);
 
 void sticking_end_block(sticking_t *sticking);
 

@@ -66,10 +66,17 @@ TEST(a_command_with_one_unknown_part_is_refused_as_a_whole)
 
 TEST(after_a_reset_it_is_like_new_but_for_its_counts)
 {
+    config.settings.z_ddot_delay = 5.0e-3f; /* signals are held back, */
+    config.settings.lever_friction = 0.2f;  /* the rate is kept, */
+    start();
+    (void)run(999u);
     other_config = config;
     lever_t *other = another();
     request(LEVER_REQUEST_FREEZE);
-    (void)run(1u);
+    lever_sample_t sample = sample_after(1u);
+    sample.tau_m_valid = false; /* and the torque has been missing */
+    (void)lever_update(lever, &sample);
+    (void)run(6u);
     request(LEVER_REQUEST_RESET);
     assert_first_guess();
     const simulation_t same = simulation;
@@ -79,7 +86,7 @@ TEST(after_a_reset_it_is_like_new_but_for_its_counts)
     time_us = 0u;
     (void)run_with(other, 2000u, false);
     assert_same_estimates(lever, other);
-    TEST_ASSERT_EQUAL_UINT32(3001u, health().samples);
+    TEST_ASSERT_EQUAL_UINT32(3006u, health().samples);
     TEST_ASSERT_EQUAL_UINT32(0u, health().late);
 }
 

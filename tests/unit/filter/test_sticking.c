@@ -19,7 +19,7 @@ static sticking_t sticking;
 void setUp(void)
 {
     source.state = 23u;
-    sticking_start(&sticking);
+    sticking = (sticking_t){.sum = 0.0f};
 }
 
 static void add_block(double rate)
