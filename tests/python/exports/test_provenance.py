@@ -75,7 +75,7 @@ def test_the_revision_is_that_of_the_tree_of_the_package_and_of_no_other(
         )
         return done.stdout.strip()
 
-    package = tmp_path / "host_tools/lever_cdkf"
+    package = tmp_path / "host_tools/lever_cdkf/runtime"
     package.mkdir(parents=True)
     shutil.copy(str(origin.__file__), package / "provenance.py")
     monkeypatch.setattr(origin, "__file__", str(package / "provenance.py"))

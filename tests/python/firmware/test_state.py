@@ -16,7 +16,7 @@ from elftools.elf.elffile import ELFFile
 
 FIRMWARE = Path(__file__).parents[3] / "firmware"
 LEFT_OUT = re.compile(
-    r"""estimator\.setup\.(settings|model_in_use|base_scale|torque_scale|constants\..*)
+    r"""estimator\.setup\.(settings|model_in_use|base_scale|torque_scale|delay_rest|delay_samples|constants\..*)
     | estimator\.seat\.aircraft                  # set again by lever_aircraft()
     | estimator\.cdkf\.scaling\..*
     | dither\.(low|high|scale|rms_most|fade)
