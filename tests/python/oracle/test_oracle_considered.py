@@ -22,7 +22,7 @@ COUNT = 12000  # samples, 1 kHz
 AT = np.array((8000, COUNT - 1))
 PILOTS = {"lever": np.array(((2.5,), (42.0,), (1500.0,))), "hand": np.array(((500.0,), (13.5,), (9.0,)))}
 TRIM = 0.35
-STOP_RATE = 0.002  # of the friction in firmware/app/estimator.c [rad/s]
+STOP_RATE = 0.002  # of the friction in firmware/app/prediction.c [rad/s]
 FRICTION = 0.005  # [N m]
 STEPS = {"z_ddot_gain": 0.005, "z_ddot_delay": 2e-4, "tau_m_gain": 0.01, "lever_friction": FRICTION}
 LARGE = {"z_ddot_gain": 0.5, "z_ddot_delay": 0.01, "tau_m_gain": 0.5, "lever_friction": 5.0}
@@ -66,9 +66,10 @@ def moved(model: str, preload: str, torque: float) -> Array:
     x = np.repeat(((TRIM,), (0.0,)), 3, axis=1)
     states = np.empty((COUNT, 2, 3))
     for k in range(COUNT):
-        stop = np.array((-FRICTION, 0.0, FRICTION)) * x[1] / (np.abs(x[1]) + STOP_RATE)
-        middle = (0.5 * (base[k] + base[k - 1]), 0.5 * (motor[k] + motor[k - 1]) - stop, velocity[k - 1])
-        x = arm.step(x, PILOTS[model], middle, TRIM, 1e-3)
+        drive = (0.5 * (base[k] + base[k - 1]), 0.5 * (motor[k] + motor[k - 1]), velocity[k - 1])
+        rate = 0.5 * (x[1] + arm.step(x, PILOTS[model], drive, TRIM, 1e-3)[1])  # at mid-step, but for friction itself
+        stop = np.array((-FRICTION, 0.0, FRICTION)) * rate / (np.abs(rate) + STOP_RATE)
+        x = arm.step(x, PILOTS[model], (drive[0], drive[1] - stop, drive[2]), TRIM, 1e-3)
         x[1] += kick[k]
         states[k] = x
     noisy: Array = states + rng.standard_normal((COUNT, 2, 1)) * np.array(((1e-3,), (1e-2,)))

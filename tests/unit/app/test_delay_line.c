@@ -55,6 +55,7 @@ static void check_nothing_is_valid(const lever_sample_t *sample)
 }
 
 /* Time and base acceleration are those of now; the rest comes out `length` samples later, and before that nothing does. */
+/* R59 */
 TEST(signals_come_out_as_many_samples_later)
 {
     for (uint32_t length = 0u; length <= (uint32_t)DELAY_LINE_MOST; length++) {

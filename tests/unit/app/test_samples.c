@@ -294,6 +294,7 @@ TEST(a_delay_between_two_samples_is_on_the_line_between_them)
 
 /* Half of the torque samples are missing. Where somebody else has driven the motor, the torque is then not known, and nothing is
  * learnt from it; where the motor did what it was asked, it still does. */
+/* R31 */
 TEST(a_missing_torque_is_unknown_where_somebody_else_was_driving)
 {
     for (uint32_t other_drives = 0u; other_drives <= 1u; other_drives++) {

@@ -55,6 +55,7 @@ TEST(gaussian_motion_is_not_sticking)
 
 /* Half of the time still: 0.5 + 0.5 erf(0.1423 / sqrt 2) = 0.5566 of it is slower than 0.2 rms, over 0.16: an excess of
  * 2.48. */
+/* R60 */
 TEST(a_lever_that_stands_still_half_of_the_time_sticks)
 {
     double sum = 0.0;

@@ -62,6 +62,7 @@ TEST(every_lag_of_20_to_80_ms_is_seen)
 /* Sensors that are quieter than stated: what is left is coloured, but smaller than what was expected. A tenth of the
  * standard deviation, wholly coloured, is a hundredth of the variance of a sample and, as 20 of them add up, a fifth of a
  * sum's: no more than 0.35 of it. Three tenths are 1.8 of it. */
+/* R60 */
 TEST(innovations_smaller_than_expected_count_by_what_is_expected)
 {
     for (uint32_t tenths = 1u; tenths <= 3u; tenths += 2u) {
