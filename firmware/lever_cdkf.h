@@ -131,10 +131,10 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance: 2,320 bytes, and as much more as pointers are longer than 32 bits. */
+/* Room for one instance: 2,336 bytes, and as much more as pointers are longer than 32 bits. */
 typedef struct lever_room {
     const void *pointers[4];
-    uint8_t rest[2304];
+    uint8_t rest[2320];
 } lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
@@ -321,6 +321,14 @@ typedef struct lever_correction {
  * whoever gets none for 100 ms takes 0. */
 void lever_correction(const lever_t *lever, lever_correction_t *correction);
 
+/* --- evidence --------------------------------------------------------------------------------------------------- */
+
+enum lever_evidence_limits { LEVER_TEST_RATIOS = 13 };
+
+/* What is watched for faults and changes: each statistic over its threshold, as at the end of the last learn_period. Above
+ * 1 it is evidence, until it falls below a second threshold; firmware/app/evidence.def has the list, in this order. */
+void lever_test_ratios(const lever_t *lever, float ratio[LEVER_TEST_RATIOS]);
+
 /* --- names ------------------------------------------------------------------------------------------------------ */
 
 /* Name ("m_p") and unit ("kg") of a parameter of a model; NULL for an index or model that does not exist. */
@@ -467,7 +475,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 2023 };
+enum lever_state_limits { LEVER_STATE_BYTES = 2025 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

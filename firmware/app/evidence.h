@@ -50,12 +50,12 @@ typedef struct motion {
 } motion_t;
 
 typedef struct evidence {
-    float ratio[EVIDENCE_MISSING]; /* statistic over threshold, of those that are no states */
-    uint32_t present;              /* a bit each */
-    uint32_t faults;               /* of enum lever_fault, that it shows as at the end of a block */
-    float since_change;            /* time since the pilot changed last [s] */
-    float nis_fast;                /* mean of nis / nis_size over 0.1 s; expected 1, */
-    float nis_slow;                /* and over excitation_time */
+    float ratio[LEVER_TEST_RATIOS]; /* statistic over threshold, of those that are no states */
+    uint32_t present;               /* a bit each */
+    uint32_t faults;                /* of enum lever_fault, that it shows as at the end of a block */
+    float since_change;             /* time since the pilot changed last [s] */
+    float nis_fast;                 /* mean of nis / nis_size over 0.1 s; expected 1, */
+    float nis_slow;                 /* and over excitation_time */
     motion_t motion;
     stillness_t stillness[SIGNAL_COUNT];
     float awake;                 /* time since there was too little motion [s] */

@@ -134,6 +134,7 @@ static bool carry_out(lever_t *lever, const lever_command_t *command)
         if (resets) {
             dither_reset(&lever->dither);
             lever->link.frequency = (uint8_t)MESSAGE_FEEDTHROUGH_LOWEST;
+            lever->link.evidence = 0u;
         }
         if (command->dither_rms < (float)LEVER_KEEP) {
             dither_set(&lever->dither, command->dither_rms, resets || !lever->gate.open); /* a reset closes it */

@@ -1,5 +1,6 @@
 #include "app/learning.h"
 #include "math/bounds.h"
+#include "math/invariant.h"
 #include "math/share.h"
 
 #define KEEP_PERIOD 1.0f      /* [s] [base_sign] */
@@ -63,6 +64,7 @@ static float turn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, uint
         evidence_begin_change(&learning->evidence, true, true);
         learning->verdict = verdict_of(learning->evidence.present);
     }
+    INVARIANT(learning->verdict < (uint8_t)VERDICT_COUNT);
     if ((actions & (uint32_t)ACTION_RESTORE) != 0u) {
         restore(learning, cdkf);
     }

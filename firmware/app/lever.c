@@ -3,6 +3,7 @@
 #include "app/link.h"
 
 #include <stddef.h>
+#include <string.h>
 
 /* cppcheck-suppress misra-c2012-2.3 ; D5 */
 typedef char lever_fits_its_memory[(sizeof(struct lever) <= sizeof(lever_memory_t)) ? 1 : -1];
@@ -89,6 +90,11 @@ void lever_health(const lever_t *lever, lever_health_t *health)
     health->faults = instance_faults(lever);
     health->torque = lever->gate.torque;
     health->gate_open = lever->gate.open;
+}
+
+void lever_test_ratios(const lever_t *lever, float ratio[LEVER_TEST_RATIOS])
+{
+    (void)memcpy(ratio, lever->estimator.learning.evidence.ratio, sizeof lever->estimator.learning.evidence.ratio);
 }
 
 /* --- CAN -------------------------------------------------------------------------------------------------------------- */

@@ -16,13 +16,14 @@
 /* The divided messages, in the order in which they are sent in each publish_period. */
 static const uint16_t parts[] = {(uint16_t)(BIT(OUTPUT_HEALTH) | BIT(OUTPUT_STABILITY)),
     (uint16_t)BIT(OUTPUT_PARAMETERS), (uint16_t)BIT(OUTPUT_SIGMA), (uint16_t)BIT(OUTPUT_DYNAMICS),
-    (uint16_t)BIT(OUTPUT_FEEDTHROUGH), (uint16_t)BIT(OUTPUT_LINK_HEALTH), (uint16_t)BIT(OUTPUT_PLATFORM)};
+    (uint16_t)BIT(OUTPUT_FEEDTHROUGH), (uint16_t)(BIT(OUTPUT_LINK_HEALTH) | BIT(OUTPUT_TEST_RATIO)),
+    (uint16_t)BIT(OUTPUT_PLATFORM)};
 #define PARTS ((uint32_t)(sizeof(parts) / sizeof(parts[0])))
 
 static const uint8_t data_ids[OUTPUTS] = {MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_CORRECTION_DATA_ID,
     MESSAGE_COMMAND_ACK_DATA_ID, MESSAGE_PILOT_PARAMETERS_DATA_ID, MESSAGE_PILOT_SIGMA_DATA_ID,
     MESSAGE_PILOT_DYNAMICS_DATA_ID, MESSAGE_FEEDTHROUGH_DATA_ID, MESSAGE_STABILITY_DATA_ID, MESSAGE_HEALTH_DATA_ID,
-    MESSAGE_LINK_HEALTH_DATA_ID, MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_IDENTITY_DATA_ID,
+    MESSAGE_LINK_HEALTH_DATA_ID, MESSAGE_TEST_RATIO_DATA_ID, MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_IDENTITY_DATA_ID,
     MESSAGE_STATE_ESTIMATE_DATA_ID};
 
 /* Any number of missing samples is coasted through, so as many lost frames are tolerated as can be told from a frame
@@ -292,6 +293,7 @@ enum lever_mode link_step(lever_t *lever)
         due |= mitigates ? BIT(OUTPUT_CORRECTION) : 0u;
         due |= (link->pages != 0u) ? BIT(OUTPUT_IDENTITY) : 0u;
         due &= (lever->has_platform || lever->settings_changed) ? UINT32_MAX : ~BIT(OUTPUT_PLATFORM);
+        due &= (lever->estimator.setup.settings->publish_test_ratios > 0.0f) ? UINT32_MAX : ~BIT(OUTPUT_TEST_RATIO);
         due &= (lever->bounce.aircraft != NULL) ? UINT32_MAX : ~BIT(OUTPUT_STABILITY);
         link->due = (uint16_t)(link->due | due);
     }

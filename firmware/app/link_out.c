@@ -139,6 +139,20 @@ static bool encode_link_health(lever_t *lever, lever_frame_t *frame)
     return message_link_health_encode(frame, &message);
 }
 
+/* One statistic after the other, each time the next. */
+static bool encode_test_ratio(lever_t *lever, lever_frame_t *frame)
+{
+    link_t *link = &lever->link;
+    const learning_t *learning = &lever->estimator.learning;
+    const float ratio = learning->evidence.ratio[link->evidence];
+    const message_test_ratio_t message = {.ratio = greater(lesser(ratio, MESSAGE_TEST_RATIO_MOST), 0.0f),
+        .evidence = link->evidence,
+        .verdict = learning->verdict,
+        .present = evidence_has(&learning->evidence, (enum evidence_id)link->evidence)};
+    link->evidence = (uint8_t)((link->evidence + 1u) % (uint32_t)LEVER_TEST_RATIOS);
+    return message_test_ratio_encode(frame, &message);
+}
+
 static bool encode_platform(lever_t *lever, lever_frame_t *frame)
 {
     const lever_platform_t *platform = &lever->platform;
@@ -194,7 +208,7 @@ static bool encode_state_estimate(lever_t *lever, lever_frame_t *frame)
 /* In the order of enum link_output. */
 static bool (*const encoders[OUTPUTS])(lever_t *lever, lever_frame_t *frame) = {encode_motor_command, encode_correction,
     encode_command_ack, encode_parameters, encode_sigma, encode_dynamics, encode_feedthrough, encode_stability,
-    encode_health, encode_link_health, encode_platform, encode_identity, encode_state_estimate};
+    encode_health, encode_link_health, encode_test_ratio, encode_platform, encode_identity, encode_state_estimate};
 
 bool link_encode(lever_t *lever, enum link_output output, lever_frame_t *frame)
 {

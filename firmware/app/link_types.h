@@ -21,6 +21,7 @@ enum link_output {
     OUTPUT_STABILITY,
     OUTPUT_HEALTH,
     OUTPUT_LINK_HEALTH,
+    OUTPUT_TEST_RATIO,
     OUTPUT_PLATFORM,
     OUTPUT_IDENTITY,
     OUTPUT_STATE_ESTIMATE,
@@ -51,6 +52,7 @@ typedef struct link {
     uint16_t due;            /* messages still to fetch, a bit each */
     uint8_t parts;           /* how many of the set are out, or due */
     uint8_t pages;           /* of IDENTITY still to send, a bit each */
+    uint8_t evidence;        /* of the next TEST_RATIO */
     uint8_t frequency;       /* of the next FEEDTHROUGH [Hz] */
     uint8_t command_counter; /* of the last COMMAND, and what became of it */
     uint8_t command_result;

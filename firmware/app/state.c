@@ -3,6 +3,7 @@
 #include "app/instance.h"
 #include "math/bounds.h"
 #include "math/crc32.h"
+#include "math/factor.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -97,6 +98,7 @@ static const state_row_t rows[] = {
     MEMBERS(link.due, link.due, 2u, ((uint32_t)1u << (uint32_t)OUTPUTS) - 1u),
     BYTES(link.parts, link.parts, ANY_BYTE),
     BYTES(link.pages, link.pages, ((uint32_t)1u << (uint32_t)MESSAGE_PAGE_COUNT) - 1u),
+    BYTES(link.evidence, link.evidence, (uint32_t)LEVER_TEST_RATIOS - 1u),
     BYTES(link.frequency, link.command_counter, COUNTER),
     BYTES(link.command_result, link.command_result, (uint32_t)MESSAGE_RESULT_COUNT - 1u),
     BYTES(link.counter[0], link.counter[OUTPUT_STATE_ESTIMATE], COUNTER),
@@ -309,6 +311,13 @@ static bool is_drawn(const estimator_t *estimator)
     return same;
 }
 
+/* The filter's invariant, and that its factors are triangular. */
+static bool is_belief(const cdkf_t *cdkf)
+{
+    return cdkf_is_valid(cdkf) && factor_is_lower(cdkf->s, MODEL_PARAMETERS) &&
+           factor_is_lower(cdkf->s_xx, MODEL_STATES);
+}
+
 /* A belief that may be returned to keeps the invariant, and all that is stated of it is finite. */
 static bool can_return(const estimator_t *estimator, const snapshot_t *kept)
 {
@@ -319,7 +328,7 @@ static bool can_return(const estimator_t *estimator, const snapshot_t *kept)
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         size += cdkf_parameter_sigma(&returned, i);
     }
-    return cdkf_is_valid(&returned) && (size < FLOAT_LIMIT);
+    return is_belief(&returned) && (size < FLOAT_LIMIT);
 }
 
 /* What the belief is moved by is no more than settings and samples can make it, so that no product of it overflows. */
@@ -353,7 +362,7 @@ static bool is_consistent(const lever_t *lever)
     }
     const bool squares = (estimate.nis >= 0.0f) && (lever->estimator.learning.evidence.motion.slow >= 0.0f);
     const snapshot_t *kept = lever->estimator.learning.kept;
-    return finite && squares && cdkf_is_valid(&lever->estimator.cdkf) && is_drawn(&lever->estimator) &&
+    return finite && squares && is_belief(&lever->estimator.cdkf) && is_drawn(&lever->estimator) &&
            is_moderate(&lever->estimator.cdkf) && can_return(&lever->estimator, &kept[0]) &&
            can_return(&lever->estimator, &kept[1]);
 }

@@ -187,6 +187,30 @@ bool message_feedthrough_decode(message_feedthrough_t *message, const lever_fram
     return fits;
 }
 
+/* --- TEST_RATIO --------------------------------------------------------------------------------------------------- */
+
+static const place_t test_ratio_code[] = {CODE(12u, 15u), CODE(16u, 15u), CODE(20u, 1u)};
+static const quantity_t test_ratio_quantity[] = {UNSIGNED(24u, 65535u, 1000.0f)};
+static const layout_t test_ratio = LAYOUT(MESSAGE_TEST_RATIO_ID, test_ratio_code, test_ratio_quantity);
+
+bool message_test_ratio_encode(lever_frame_t *frame, const message_test_ratio_t *message)
+{
+    const uint32_t code[] = {message->evidence, message->verdict, bit_of(message->present)};
+    return layout_encode(frame, &test_ratio, code, &message->ratio);
+}
+
+bool message_test_ratio_decode(message_test_ratio_t *message, const lever_frame_t *frame)
+{
+    uint32_t code[COUNT(test_ratio_code)];
+    const bool fits = layout_decode(code, &message->ratio, &test_ratio, frame);
+    if (fits) {
+        message->evidence = (uint8_t)code[0];
+        message->verdict = (uint8_t)code[1];
+        message->present = (code[2] != 0u);
+    }
+    return fits;
+}
+
 /* --- STABILITY ---------------------------------------------------------------------------------------------------- */
 
 static const place_t stability_code[] = {CODE(12u, 3u), CODE(14u, 1u)};

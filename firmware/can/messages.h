@@ -47,6 +47,7 @@ enum message_id {
     MESSAGE_STABILITY_ID = 0x21B,
     MESSAGE_CORRECTION_ID = 0x21C,
     MESSAGE_SNAPSHOT_ID = 0x21D,
+    MESSAGE_TEST_RATIO_ID = 0x21E,
     MESSAGE_PLATFORM_RESET_ID = 0x21F
 };
 
@@ -70,6 +71,7 @@ enum message_data_id {
     MESSAGE_STABILITY_DATA_ID = 240,
     MESSAGE_CORRECTION_DATA_ID = 9,
     MESSAGE_SNAPSHOT_DATA_ID = 25,
+    MESSAGE_TEST_RATIO_DATA_ID = 41,
     MESSAGE_PLATFORM_RESET_DATA_ID = 73
 };
 
@@ -176,6 +178,18 @@ typedef struct message_feedthrough {
 
 bool message_feedthrough_encode(lever_frame_t *frame, const message_feedthrough_t *message);
 bool message_feedthrough_decode(message_feedthrough_t *message, const lever_frame_t *frame);
+
+#define MESSAGE_TEST_RATIO_MOST 65.534f /* stands for any greater one */
+
+typedef struct message_test_ratio {
+    float ratio;      /* statistic over its threshold [1] */
+    uint8_t evidence; /* which: enum evidence_id of app/evidence.def */
+    uint8_t verdict;  /* enum verdict of app/verdict.def */
+    bool present;     /* the statistic is over its threshold, or not yet below where it is withdrawn */
+} message_test_ratio_t;
+
+bool message_test_ratio_encode(lever_frame_t *frame, const message_test_ratio_t *message);
+bool message_test_ratio_decode(message_test_ratio_t *message, const lever_frame_t *frame);
 
 typedef struct message_stability {
     float gain_margin; /* [dB] */

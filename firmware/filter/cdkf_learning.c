@@ -2,6 +2,7 @@
 #include "filter/cdkf.h"
 #include "math/bounds.h"
 #include "math/factor.h"
+#include "math/invariant.h"
 #include "math/share.h"
 
 #include <math.h>
@@ -126,6 +127,7 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
         correction->variance[i] -= factor_variance(cdkf->s, L, i);
         correction->w[i] = cdkf->w[i] - correction->w[i];
     }
+    INVARIANT(factor_is_lower(cdkf->s, L));
 }
 
 #define STEP_SIGMA 100.0f /* [rad/s^2]: a lever that rests 10 degrees from where it was */

@@ -2,6 +2,7 @@
 #include "filter/cdkf.h"
 #include "filter/grip.h"
 #include "math/factor.h"
+#include "math/invariant.h"
 
 #include <math.h>
 #include <stddef.h>
@@ -109,4 +110,5 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
     if (taken) {
         grip_take(cdkf, grip, &seen);
     }
+    INVARIANT(factor_is_lower(cdkf->s_xx, MODEL_STATES));
 }

@@ -20,7 +20,7 @@ enum {
     ESTIMATE_STEPS = 7,  /* after which the estimate is looked at: it takes longer than a step */
     MOST_SETTINGS = 15,  /* that an input changes */
     MOST_ALIGNING = 400, /* samples, for which the end waits */
-    OUTPUT_IDS = 13,
+    OUTPUT_IDS = 15,
     FIRST_OUTPUT = 0x210
 };
 
@@ -150,7 +150,7 @@ static void check_frames(bench_t *bench)
         MESSAGE_PILOT_SIGMA_DATA_ID, MESSAGE_PILOT_DYNAMICS_DATA_ID, MESSAGE_HEALTH_DATA_ID,
         MESSAGE_MOTOR_COMMAND_DATA_ID, MESSAGE_PLATFORM_HEALTH_DATA_ID, MESSAGE_IDENTITY_DATA_ID,
         MESSAGE_COMMAND_ACK_DATA_ID, MESSAGE_LINK_HEALTH_DATA_ID, MESSAGE_FEEDTHROUGH_DATA_ID,
-        MESSAGE_STABILITY_DATA_ID, MESSAGE_CORRECTION_DATA_ID};
+        MESSAGE_STABILITY_DATA_ID, MESSAGE_CORRECTION_DATA_ID, MESSAGE_SNAPSHOT_DATA_ID, MESSAGE_TEST_RATIO_DATA_ID};
     static const e2e_tolerance_t strict = {0u, 0u, 0u};
     lever_frame_t frame = {.length = 0u};
     message_motor_command_t motor;

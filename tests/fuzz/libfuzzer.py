@@ -33,7 +33,7 @@ SOURCES = {
 HEXADECIMAL = ("app",)
 FLAGS = (
     *("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-g", "-O1", "-fno-omit-frame-pointer"),
-    *("-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all"),
+    *("-fsanitize=fuzzer,address,undefined", "-fno-sanitize-recover=all", "-DLEVER_ASSERTIONS"),
     *(f"-I{ROOT / folder}" for folder in ("firmware", "host_tools/lever_cdkf/firmware/c", "tests/fuzz")),
 )
 COMPILERS = "clang-19|clang"

@@ -1,4 +1,4 @@
-"""The tables of firmware/app/README.md are those of evidence.def and verdict.def."""
+"""The tables of firmware/app/README.md and the names in lever.dbc are those of evidence.def and verdict.def."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 
 import pytest
+from lever_cdkf.can import codec
 from quality import tools
 
 APP = tools.FIRMWARE / "app"
@@ -52,3 +53,10 @@ def table(name: str) -> str:
 @pytest.mark.parametrize("name", COLUMNS)
 def test_the_readme_prints_the_table(name: str) -> None:
     assert table(name) in (APP / "README.md").read_text(encoding="utf-8"), f"put this there:\n{table(name)}"
+
+
+def test_the_contract_has_the_same_names() -> None:
+    """Of the evidence only what has a statistic."""
+    statistics = [first for first, *_, meaning in rows("evidence") if not meaning.startswith("state")]
+    assert list(codec.choices("TEST_RATIO", "evidence").values()) == statistics
+    assert list(codec.choices("TEST_RATIO", "verdict").values()) == [first for first, *_ in rows("verdict")]

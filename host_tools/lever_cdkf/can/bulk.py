@@ -34,7 +34,7 @@ LONGEST_LINE: int = _lib.BULK_LINE
 
 ANSWERS = (
     *("STATE_ESTIMATE", "PILOT_PARAMETERS", "PILOT_SIGMA", "PILOT_DYNAMICS", "FEEDTHROUGH", "HEALTH", "LINK_HEALTH"),
-    *("MOTOR_COMMAND", "STABILITY", "CORRECTION"),
+    *("MOTOR_COMMAND", "STABILITY", "CORRECTION", "TEST_RATIO"),
 )
 """The messages of the estimator that rows hold, in the order of their slots."""
 SLOTS = {name: slot for slot, name in enumerate(("LEVER_SAMPLE", "BASE_SAMPLE", "GRIP_SAMPLE", *ANSWERS))}

@@ -63,6 +63,12 @@ def message(key: str | int) -> Message:
     return messages[key]
 
 
+def choices(name: str, signal: str) -> dict[int, str]:
+    """Return the words that values of a signal stand for, but for that of what is not available."""
+    named = message(name).get_signal_by_name(signal).choices or {}
+    return {value: str(word) for value, word in named.items() if str(word) != _NOT_AVAILABLE}
+
+
 @cache
 def _messages() -> dict[str | int, Message]:
     return {key: entry for entry in database().messages for key in (entry.name, entry.frame_id)}

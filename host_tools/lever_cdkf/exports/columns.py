@@ -14,11 +14,12 @@ from ..firmware.library import enum_names
 from ..firmware.quantities import quantities, recorded_name
 from ..numeric.arrays import FloatArray
 from ..results.feedthrough import FEEDTHROUGH
+from ..results.ratios import TEST_RATIO
 from ..results.trace import CORRECTION, ESTIMATED, HEALTH, MEASURED, STABILITY, TRUE_MARGIN, quantity_fields
 
 MEASUREMENT, ESTIMATE, RECORDED, TRUTH = "measurement", "estimate", "recorded", "truth"
 """Kinds of columns; recorded are the estimates of the firmware that ran when a log was recorded."""
-TEXT = ("mode", "faults", "mode_recorded", "bounce")
+TEXT = ("mode", "faults", "mode_recorded", "bounce", "evidence", "verdict")
 """Columns of the trace whose numbers stand for words."""
 
 _DERIVED = {  # unit and comment of fields that are not in lever.dbc (fields.py)
@@ -74,6 +75,8 @@ def words(column: str, number: int) -> str:
     """Return what a number of one of the columns TEXT stands for: "run"; "excitation, torque"."""
     if column == "faults":
         return ", ".join(fault_names(number))
+    if column in ("evidence", "verdict"):
+        return codec.choices("TEST_RATIO", column).get(number, "")
     return enum_names("lever_bounce" if column == "bounce" else "lever_mode").get(number, "")
 
 
@@ -107,6 +110,8 @@ def _known(model: str) -> Iterator[Column]:
         yield _of_message(source, f"feedthrough_{field}", message, field, held=True)
     for source, message, field in STABILITY:
         yield _of_message(source, _STABILITY_NAMES.get(field, field), message, field, held=True)
+    for source, message, field in TEST_RATIO:
+        yield _of_message(source, source, message, field, held=True)
     yield _of_message(CORRECTION[0], CORRECTION[2], *CORRECTION[1:])
     yield _of_message("dither_N_m", "dither", "MOTOR_COMMAND", "dither")
     for source, unit, comment in _TRUTH:

@@ -196,6 +196,15 @@ class Estimator:
         response = complex(raw.real, raw.imaginary)
         return Feedthrough(response, raw.gain_sigma, raw.phase_sigma, raw.correlation)
 
+    def test_ratios(self) -> dict[str, float]:
+        """Return each statistic that is watched for faults and changes, over its threshold [1]: above 1 it is
+        evidence."""
+        from ..can import codec  # which takes 0.1 s
+
+        ratios = ffi.new("float[]", lib.LEVER_TEST_RATIOS)
+        lib.lever_test_ratios(self.pointer, ratios)
+        return dict(zip(codec.choices("TEST_RATIO", "evidence").values(), ratios, strict=True))
+
     def watch(self, aircraft: AircraftResponse | None) -> None:
         """Watch the loop with this aircraft from now on; None: with none. Raise LeverError."""
         if not lib.lever_aircraft(self.pointer, ffi.NULL if aircraft is None else aircraft.pointer):

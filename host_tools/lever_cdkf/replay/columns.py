@@ -16,6 +16,7 @@ from ..firmware.library import enum_names
 from ..firmware.quantities import recorded_name
 from ..numeric.arrays import FloatArray
 from ..results.feedthrough import FEEDTHROUGH
+from ..results.ratios import TEST_RATIO
 from ..results.trace import CORRECTION, ESTIMATED, HEALTH, MEASURED, STABILITY, Trace, quantity_fields
 from .timeline import Timeline
 
@@ -27,13 +28,20 @@ class Columns:
     """Keeps what goes on from piece to piece: time, held counts."""
 
     def __init__(
-        self, timeline: Timeline, model: str, with_recorded: bool, watched: bool, absent: tuple[str, ...] = ()
+        self,
+        timeline: Timeline,
+        model: str,
+        with_recorded: bool,
+        watched: bool,
+        rated: bool,
+        absent: tuple[str, ...] = (),
     ) -> None:
-        """`watched`: whether the estimator knows the aircraft; `absent`: faults that say only that an input is missing
-        which the mapping does not have."""
+        """`watched`: whether the estimator knows the aircraft; `rated`: whether it sends test ratios; `absent`: faults
+        that say only that an input is missing which the mapping does not have."""
         self._timeline = timeline
         self._absent = sum(bit for bit, name in enum_names("lever_fault").items() if name in absent)
-        self._fields = (*quantity_fields(model), *FEEDTHROUGH, *HEALTH, *(STABILITY if watched else ()))
+        optional = (*(STABILITY if watched else ()), *(TEST_RATIO if rated else ()))
+        self._fields = (*quantity_fields(model), *FEEDTHROUGH, *HEALTH, *optional)
         self._watched, self._with_recorded = watched, with_recorded
         self._compared = (*ESTIMATED, *quantity_fields(model), *(entry for entry in HEALTH if entry[0] == "mode"))
         self._counts = dict.fromkeys(COUNTS, 0)

@@ -207,7 +207,8 @@ class _Replay:
         if self._folder is not None:
             self._sinks.append(self.kept)
         watched = self._options.aircraft is not None
-        return Columns(self._timeline, self.model, with_recorded, watched, self._absent())
+        rated = self._options.config.settings["publish_test_ratios"] > 0.0
+        return Columns(self._timeline, self.model, with_recorded, watched, rated, self._absent())
 
     def _absent(self) -> tuple[str, ...]:
         """Return faults of inputs that the mapping does not have."""

@@ -14,6 +14,7 @@ from ..report.series import Welch
 from ..results.coherence import Coherence
 from ..results.feedthrough import Feedthrough
 from ..results.nis import freedom
+from ..results.ratios import TestRatios
 from ..results.summary import ReplaySummary
 from ..results.trace import Trace
 from .reduction import Ends, Groups, Stretches
@@ -36,6 +37,7 @@ class Kept:
         self.ends = Ends(_CLOSE_UP)
         self.spectra = {name: Welch(sample_period) for name in _SPECTRA}
         self.feedthrough = Feedthrough()
+        self.test_ratios = TestRatios()
         self.coherence = Coherence(sample_period)
         size = max(1, round(_NIS_AVERAGE / sample_period))
         self.nis = Groups(size, lambda time, nis, outputs: nis_averages(time, nis, outputs, size, _NIS_AVERAGE)[:3])
@@ -51,6 +53,7 @@ class Kept:
         for name, spectrum in self.spectra.items():
             spectrum.add(trace[name])
         self.feedthrough.add(trace)
+        self.test_ratios.add(trace)
         self.coherence.add(*(trace[name] for name in COHERENT))
 
 
@@ -92,6 +95,10 @@ class RecordedRun(Run):
     @cached_property
     def feedthrough(self) -> Feedthrough:
         return self._kept.feedthrough
+
+    @cached_property
+    def test_ratios(self) -> TestRatios:
+        return self._kept.test_ratios
 
     @cached_property
     def coherence(self) -> Coherence:

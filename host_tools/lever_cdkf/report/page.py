@@ -239,6 +239,12 @@ def _health(page: Page, run: Run) -> None:
             "The mode of the estimator (blue) and the faults that it reported (orange). Below, how many frames were "
             "lost, corrupt or late on the bus. What is not shown did not occur.",
         ),
+        page.figure(
+            "figure-test-ratios",
+            health.test_ratios(run),
+            "How near each kind of evidence is: its statistic over its threshold. Above 1 it is evidence, and stays so "
+            "until it is well below; it then shows as a fault, or as a change of the pilot.",
+        ),
     )
 
 

@@ -16,6 +16,7 @@ from ..results import whiteness
 from ..results.coherence import Coherence
 from ..results.faults import OPTIONAL, warning_bits
 from ..results.feedthrough import Feedthrough
+from ..results.ratios import TestRatios
 from ..results.summary import RecordingSummary, ReplaySummary, SimulationSummary, Summary
 from ..results.trace import MEASURED
 from ..results.whiteness import Whiteness
@@ -150,6 +151,13 @@ class Run:
     def feedthrough(self) -> Feedthrough:
         """θ/z̈ as the estimator sent it; empty where the trace has none."""
         kept = Feedthrough()
+        kept.add(self.trace)
+        return kept
+
+    @cached_property
+    def test_ratios(self) -> TestRatios:
+        """As the estimator sent them; empty where the trace has none."""
+        kept = TestRatios()
         kept.add(self.trace)
         return kept
 

@@ -26,7 +26,7 @@ Trace = dict[str, FloatArray]
 CONVERGED_AFTER = 15.0
 """Time [s] from which on estimates are judged, unless a scenario says otherwise."""
 
-WHOLE = ("mode", "faults", "lost", "corrupt", "late", "restarts", "bounce")
+WHOLE = ("mode", "faults", "lost", "corrupt", "late", "restarts", "bounce", "evidence", "verdict")
 """Columns of whole numbers."""
 _ROWS_AT_ONCE = 1 << 13  # that are made into text
 

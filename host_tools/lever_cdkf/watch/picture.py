@@ -91,6 +91,7 @@ class Picture:
         self.acknowledgements: deque[dict[str, float]] = deque(maxlen=16)
         """Fields of each COMMAND_ACK; to be taken from here."""
         self._first_estimate: float | None = None
+        self._ratios: dict[int, tuple[float, float]] = {}  # by evidence: when heard, and what
         self._feedthrough: dict[int, tuple[float, Feedthrough]] = {}  # by frequency: when heard, and what
         self._paired = Paired()
 
@@ -180,6 +181,10 @@ class Picture:
             entries.append(entry if entry and fresh else Feedthrough(frequency, complex(NAN, NAN), NAN, NAN))
         return entries
 
+    def test_ratios(self) -> dict[int, float]:
+        """Return the statistics that were sent lately over their thresholds, by the number of their evidence."""
+        return {key: ratio for key, (heard, ratio) in self._ratios.items() if self.now - heard <= STALE_AFTER}
+
     def coherence(self) -> Measured | None:
         """Measured, of base acceleration and lever angle over the last seconds; None while there is too little."""
         return self._paired.coherence(self.now)
@@ -231,7 +236,7 @@ class Picture:
             self._count(("restarts",), columns)
         elif name == "LINK_HEALTH":
             self._count(("lost", "corrupt", "late"), columns)
-        elif name in ("IDENTITY", "COMMAND_ACK", "FEEDTHROUGH"):
+        elif name in ("IDENTITY", "COMMAND_ACK", "FEEDTHROUGH", "TEST_RATIO"):
             for row in range(len(data)):
                 self._take_once(name, {key: float(column[row]) for key, column in columns.items()})
         elif name == "PLATFORM_HEALTH":
@@ -248,6 +253,8 @@ class Picture:
             frequency, response = int(values["frequency"]), complex(values["real"], values["imaginary"])
             sigmas = values["gain_sigma"], values["phase_sigma"]
             self._feedthrough[frequency] = self.now, Feedthrough(frequency, response, *sigmas)
+        elif name == "TEST_RATIO":
+            self._ratios[int(values["evidence"])] = self.now, values["ratio"]
         else:
             self.acknowledgements.append(values)
 

@@ -56,14 +56,23 @@ def bounce(picture: Picture) -> tuple[str, str] | None:
     return level, f"{name}: gain margin {margin:.1f} ± {sigma:.1f} dB{at}"
 
 
+def nearest_evidence(picture: Picture) -> str | None:
+    """Return the three statistics that are nearest to their thresholds, or over them; None where they are not sent."""
+    ratios = picture.test_ratios()
+    names = codec.choices("TEST_RATIO", "evidence")
+    nearest = sorted((key for key in ratios if key in names), key=lambda key: -ratios[key])[:3]
+    texts = [f"{names[key].replace('_', ' ')} {ratios[key]:.2f}" for key in nearest]
+    return f"{', '.join(texts)} (of 1)" if texts else None
+
+
 def last_reset(picture: Picture) -> str | None:
     """Return what made the machine start last, and what its self tests have found since; None if it does not say."""
     if not picture.is_fresh("PLATFORM_RESET"):
         return None
     names = ("cause", "resets", "failed", "fault_address")
     cause, resets, failed, address = (int(picture.field("PLATFORM_RESET", name)) for name in names)
-    causes = dict(codec.message("PLATFORM_RESET").get_signal_by_name("cause").choices or ())
-    parts = [f"{str(causes.get(cause, cause)).replace('_', ' ')}, {resets} since power-on"]
+    causes = codec.choices("PLATFORM_RESET", "cause")
+    parts = [f"{causes.get(cause, str(cause)).replace('_', ' ')}, {resets} since power-on"]
     if tests := [name for bit, name in SELF_TESTS.items() if failed & bit]:
         parts.append(f"failed: {', '.join(tests)}")
     if address:

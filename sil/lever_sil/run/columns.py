@@ -9,6 +9,7 @@ import numpy as np
 from lever_cdkf.can import codec, fields
 from lever_cdkf.numeric.arrays import FloatArray
 from lever_cdkf.results.feedthrough import FEEDTHROUGH
+from lever_cdkf.results.ratios import TEST_RATIO
 from lever_cdkf.results.trace import (
     CORRECTION,
     ESTIMATED,
@@ -42,7 +43,9 @@ def columns_of(recording: Recording, frames: Frames) -> Trace:
         trace[column] = decoded.at_samples(message, field)
     model = recording.scenario.config.choices["model"]
     watched = recording.scenario.aircraft is not None
-    for column, message, field in (*quantity_fields(model), *FEEDTHROUGH, *HEALTH, *(STABILITY if watched else ())):
+    rated = recording.scenario.config.settings["publish_test_ratios"] > 0.0
+    optional = (*(STABILITY if watched else ()), *(TEST_RATIO if rated else ()))
+    for column, message, field in (*quantity_fields(model), *FEEDTHROUGH, *HEALTH, *optional):
         trace[column] = decoded.held(message, field)
     if watched:
         trace[CORRECTION[0]] = decoded.at_samples(*CORRECTION[1:])

@@ -20,6 +20,7 @@ from lever_cdkf.cli.main import main
 from lever_cdkf.replay import engine, reduction
 from lever_cdkf.replay.outputs import FILES
 from lever_cdkf.replay.summary import verdict
+from lever_cdkf.results.ratios import evidence_names
 from lever_cdkf.results.summary import ReplaySummary, of
 from python.conftest import Refused, Session, simulated
 from python.report.reading import figures, first_number, read, unpack
@@ -96,6 +97,18 @@ def test_the_trace_is_that_of_the_simulation_without_the_truth(session: Session,
     for name in ("k_p", "natural_frequency"):
         column = next(column for column in again if column.startswith(f"{name}_recorded"))
         assert again[column] == simulation[column.replace("recorded", "estimate")], name
+
+
+def test_test_ratios_are_those_of_the_simulation(tmp_path: Path) -> None:
+    """And are drawn, in both pages."""
+    session = simulated("steady", tmp_path / "sim", "settings.publish_test_ratios=1")
+    replayed(tmp_path / "out", session.log, "--settings", settings_of(session, tmp_path))
+    simulation, again = (columns(folder / "trace.csv") for folder in (session.folder, tmp_path / "out"))
+    for name in ("evidence", "test_ratio", "verdict"):
+        assert again[name] == simulation[name], name
+    assert set(simulation["evidence"]) - {""} == {str(number) for number in evidence_names()}
+    for folder in (session.folder, tmp_path / "out"):
+        assert "figure-test-ratios" in (folder / "report.html").read_text(encoding="utf-8")
 
 
 def test_two_replays_are_equal_in_every_file(session: Session, replay: tuple[Path, Summary], tmp_path: Path) -> None:

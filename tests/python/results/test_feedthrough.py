@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from lever_cdkf.results.feedthrough import COLUMNS, FREQUENCIES, Feedthrough
+from lever_cdkf.results.feedthrough import FEEDTHROUGH, FREQUENCIES, Feedthrough
+
+COLUMNS = ("time_s", *(column for column, _, _ in FEEDTHROUGH))
 
 
 def test_each_frequency_is_as_last_sent_before_each_time() -> None:

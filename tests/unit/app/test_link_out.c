@@ -351,6 +351,57 @@ TEST(platform_health_is_what_the_port_reports)
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_PLATFORM));
 }
 
+/* --- test ratios --------------------------------------------------------------------------------------------------- */
+
+static void check_test_ratio(uint8_t evidence, float ratio, bool present)
+{
+    message_test_ratio_t message;
+    TEST_ASSERT_TRUE(message_test_ratio_decode(&message, &frames[0]));
+    TEST_ASSERT_EQUAL_UINT8(evidence, message.evidence);
+    TEST_ASSERT_FLOAT_WITHIN(0.0005f, ratio, message.ratio);
+    TEST_ASSERT_EQUAL(present, message.present);
+    TEST_ASSERT_EQUAL_UINT8(VERDICT_BLIND, message.verdict);
+}
+
+/* With LINK_HEALTH, where that is switched on. */
+TEST_EACH(2, a_test_ratio_is_in_each_set_where_that_is_switched_on)
+{
+    uint32_t sent = 0u;
+    config.settings.publish_test_ratios = (float)test_round;
+    publish_always();
+    (void)deliver_many(1u);
+    const uint32_t found = answers();
+    for (uint32_t k = 0u; k < found; k++) {
+        if (frames[k].id == (uint32_t)MESSAGE_TEST_RATIO_ID) {
+            TEST_ASSERT_EQUAL_HEX32(MESSAGE_LINK_HEALTH_ID, frames[k - 1u].id);
+            sent++;
+        }
+    }
+    TEST_ASSERT_EQUAL_UINT32(test_round, sent);
+}
+
+/* What the field cannot hold is the nearest that it can. */
+TEST(test_ratios_are_sent_in_turn)
+{
+    float ratio[LEVER_TEST_RATIOS];
+    publish_always();
+    evidence_t *evidence = &lever->estimator.learning.evidence;
+    lever->estimator.learning.verdict = (uint8_t)VERDICT_BLIND;
+    for (uint32_t i = 0u; i < (uint32_t)LEVER_TEST_RATIOS; i++) {
+        evidence->ratio[i] = 0.1f * (float)i;
+    }
+    evidence->ratio[EVIDENCE_MOTOR] = -1.0f;
+    evidence->ratio[EVIDENCE_HANDS] = 100.0f;
+    evidence->present = 1u << (uint32_t)EVIDENCE_HANDS;
+    lever_test_ratios(lever, ratio);
+    TEST_ASSERT_EQUAL_FLOAT_ARRAY(evidence->ratio, ratio, LEVER_TEST_RATIOS);
+    for (uint32_t i = 0u; i <= (uint32_t)LEVER_TEST_RATIOS; i++) {
+        const uint8_t which = (uint8_t)(i % (uint32_t)LEVER_TEST_RATIOS);
+        TEST_ASSERT_TRUE(link_encode(lever, OUTPUT_TEST_RATIO, &frames[0]));
+        check_test_ratio(which, (which == 0u) ? 0.0f : ((which == 1u) ? 65.534f : ratio[which]), which == 1u);
+    }
+}
+
 /* --- what is not a number ------------------------------------------------------------------------------------------ */
 
 static bool says_valid(enum link_output output)

@@ -164,7 +164,7 @@ TEST(limits_are_those_of_what_they_index)
         {offsetof(struct lever, estimator.setup.preload), 1u}, {offsetof(struct lever, estimator.setup.estimator), 1u},
         {offsetof(struct lever, estimator.setup.adaptation), 3u}, {offsetof(struct lever, estimator.cdkf.acting), 5u},
         {offsetof(struct lever, estimator.mode), 5u}, {offsetof(struct lever, estimator.nis_size), 2u},
-        {offsetof(struct lever, link.due), 0x1FFFu}, /* 13 messages */
+        {offsetof(struct lever, link.due), 0x3FFFu}, /* 14 messages */
         {offsetof(struct lever, link.pages), 7u}, {offsetof(struct lever, link.counter), 15u},
         {offsetof(struct lever, link.command_result), 7u}, {offsetof(struct lever, bounce.chosen), 5u},
         {offsetof(struct lever, bounce.state), 3u}};
@@ -322,15 +322,17 @@ TEST(counts_of_two_bytes_are_restored_whole_and_a_sample_that_waits_is_dropped)
     TEST_ASSERT_FALSE(other->link.has_sample);
 }
 
-/* Values that are floats, one by one, but that no settings and samples make. */
-TEST(a_belief_that_would_overflow_is_refused)
+/* Values that are floats, one by one, but that no settings and samples make: what would overflow, and what a factor has
+ * above its diagonal. */
+TEST(a_belief_that_would_overflow_or_is_no_factor_is_refused)
 {
     start_bus();
     fly(50u);
     cdkf_t *cdkf = &lever->estimator.cdkf;
     snapshot_t *kept = lever->estimator.learning.kept;
-    float *const value[] = {&cdkf->growth, &cdkf->growth, &kept[0].s_ww[0], &kept[1].s_ww[0]};
-    static const float wrong[] = {-1.0f, 1.0e7f, 1.0e12f, 1.0e12f};
+    float *const value[] = {
+        &cdkf->growth, &cdkf->growth, &kept[0].s_ww[0], &kept[1].s_ww[0], &cdkf->s[5], &cdkf->s_xx[1]};
+    static const float wrong[] = {-1.0f, 1.0e7f, 1.0e12f, 1.0e12f, 1.0e-3f, -1.0e-3f};
     for (uint32_t i = 0u; i < (uint32_t)(sizeof wrong / sizeof wrong[0]); i++) {
         const float right = *value[i];
         *value[i] = wrong[i];

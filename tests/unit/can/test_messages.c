@@ -54,6 +54,7 @@ TEST(a_frame_of_another_length_or_identifier_is_refused)
     ASSERT_REFUSED(pilot_sigma, MESSAGE_PILOT_SIGMA_ID);
     ASSERT_REFUSED(pilot_dynamics, MESSAGE_PILOT_DYNAMICS_ID);
     ASSERT_REFUSED(feedthrough, MESSAGE_FEEDTHROUGH_ID);
+    ASSERT_REFUSED(test_ratio, MESSAGE_TEST_RATIO_ID);
     ASSERT_REFUSED(stability, MESSAGE_STABILITY_ID);
     ASSERT_REFUSED(correction, MESSAGE_CORRECTION_ID);
     ASSERT_REFUSED(health, MESSAGE_HEALTH_ID);

@@ -38,8 +38,8 @@ enum bulk_limits {
     BULK_BUS_NAME = 32, /* bytes of a name, with its final 0 */
     BULK_LINE = 512,    /* longest line of text */
     BULK_OUT_ROOM = 16, /* frames that one frame can become in bulk_feed(), at most */
-    BULK_ANSWERS = 10,  /* messages of the estimator that rows hold */
-    BULK_SLOTS = 23     /* 3 messages of a sample, the answers, and the same answers as they were recorded */
+    BULK_ANSWERS = 11,  /* messages of the estimator that rows hold */
+    BULK_SLOTS = 25     /* 3 messages of a sample, the answers, and the same answers as they were recorded */
 };
 
 /* Names of the buses in the order of their first frame. */

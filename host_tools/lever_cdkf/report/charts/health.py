@@ -1,16 +1,21 @@
-"""What the estimator says of itself: its mode, the faults it sees, and what the bus lost."""
+"""What the estimator says of itself: its mode, the faults it sees and how near others are, and what the bus lost."""
 
 import numpy as np
 
 from ...firmware import native
 from ...numeric.arrays import Array
-from ..figure import Figure, Spec, axis, line, time_axis
+from ...results.ratios import evidence_names
+from ..figure import Figure, Spec, axis, hover, line, time_axis
 from ..run import Run
 from ..series import runs, spread_indices
 
 COUNTS = ("lost", "corrupt", "late")
 LANE_POINTS = 1500  # how finely the bars are drawn
 LEAST_SHARE = 0.002  # of the whole time: no bar is drawn shorter, or it could not be seen
+RATIO_POINTS = 1000
+RATIO_MOST = 3.0
+RATIO_COLOURS = ("estimate", "base", "torque", "truth")
+RATIO_DASHES = ("solid", "dash", "dot", "dashdot")
 COUNT_COLOURS = {"lost": "estimate", "corrupt": "torque", "late": "base"}
 
 
@@ -36,6 +41,23 @@ def timeline(run: Run) -> Figure | None:
     for name, values in counts.items():
         style = {"line_shape": "hv", "line_width": 1.5}
         figure.add(line(run.time[chosen], values[chosen], name, COUNT_COLOURS[name], 1, **style))
+    figure.mark(run.changes)
+    return figure
+
+
+def test_ratios(run: Run) -> Figure | None:
+    """Return each statistic that is watched over its threshold; None where they were not sent."""
+    time = run.time[spread_indices(len(run.time), RATIO_POINTS)]
+    ratios = run.test_ratios.at(time)
+    if not np.isfinite(ratios).any():
+        return None
+    top = min(max(1.5, 1.1 * float(np.nanmax(ratios))), RATIO_MOST)
+    figure = Figure([axis("test ratio [1]", range=[0.0, top])], time_axis(run.end), 360)
+    for index, name in enumerate(evidence_names().values()):
+        words = name.replace("_", " ")
+        colour, dash = RATIO_COLOURS[index % len(RATIO_COLOURS)], RATIO_DASHES[index // len(RATIO_COLOURS)]
+        figure.add(line(time, ratios[:, index], words, colour, line_width=1.4, line_dash=dash) | hover(words))
+    figure.add(line(np.array([0.0, run.end]), np.ones(2), "threshold", "mark", line_dash="dot", line_width=1.2))
     figure.mark(run.changes)
     return figure
 

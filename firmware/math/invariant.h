@@ -1,0 +1,13 @@
+/* What holds whatever comes in: checked in debug builds and by the fuzzers (LEVER_ASSERTIONS), nothing elsewhere. A value
+ * that is not a number breaks no invariant: app/estimator.c refuses it. */
+#ifndef MATH_INVARIANT_H
+#define MATH_INVARIANT_H
+
+#ifdef LEVER_ASSERTIONS
+#include <assert.h>
+#define INVARIANT(condition) assert(condition)
+#else
+#define INVARIANT(condition)
+#endif
+
+#endif
