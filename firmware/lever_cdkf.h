@@ -23,10 +23,10 @@
  *                                                   while (lever_next_frame(lever, &tx)) { transmit(&tx); }
  *
  * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent. Cost.
- * Every call is bounded; lever_update() is the expensive one: 2,610 instructions and 4,120 cycles on a Cortex-M4F on
- * average (lever model, as shipped), 7,700 instructions when the parameters learn (once a learn_period), 18,100 at the
- * first sample after a gap; with an aircraft and a mitigation 3,520 on average, and 18,600 at a sample with a margin
- * (25 a second). 39 KiB of code, 1.86 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
+ * Every call is bounded; lever_update() is the expensive one: 2,710 instructions and 4,240 cycles on a Cortex-M4F on
+ * average (lever model, as shipped), 7,930 instructions when the parameters learn (once a learn_period), 18,300 at the
+ * first sample after a gap; with an aircraft and a mitigation 3,790 on average, and 19,200 at a sample with a margin
+ * (25 a second). 40 KiB of code, 2.28 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
  * Numbers. Results are bit-identical on every IEEE 754 machine when built with this project's flags.
  */
 #ifndef LEVER_CDKF_H
