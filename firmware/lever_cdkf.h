@@ -513,8 +513,8 @@ typedef struct lever_recorder {
     uint32_t crc;        /* of what was sent of it */
 } lever_recorder_t;
 
-/* `period_us` of sample time from one snapshot to the next, some 270 frames each (on 1 Mbit/s classic CAN 3 % of the
- * bus at a second, 6 % at half a second). */
+/* `period_us` of sample time from one snapshot to the next, some 340 frames each (on 1 Mbit/s classic CAN 4 % of the
+ * bus at a second, 8 % at half a second). */
 void lever_recorder_init(lever_recorder_t *recorder, uint32_t period_us);
 
 /* After a step whose frames have all been fetched, before the next frame is received. */
