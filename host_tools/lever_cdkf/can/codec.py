@@ -65,8 +65,8 @@ def message(key: str | int) -> Message:
 
 def choices(name: str, signal: str) -> dict[int, str]:
     """Return the words that values of a signal stand for, but for that of what is not available."""
-    named = message(name).get_signal_by_name(signal).choices or {}
-    return {value: str(word) for value, word in named.items() if str(word) != _NOT_AVAILABLE}
+    named = message(name).get_signal_by_name(signal).choices
+    return {value: str(word) for value, word in (named or {}).items() if str(word) != _NOT_AVAILABLE}
 
 
 @cache

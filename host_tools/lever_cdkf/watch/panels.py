@@ -176,8 +176,8 @@ def health(picture: Picture, source: Source) -> Table:
         table.add_row("last reset", reset)
     text = "; ".join(faults) or ("none" if picture.mode else NOTHING)
     table.add_row("faults", Text(text, style=style if picture.mode else "dim"))
-    if (near := status.nearest_evidence(picture)) is not None:
-        table.add_row("evidence", near)
+    if (nearest := status.nearest_evidence(picture)) is not None:
+        table.add_row("evidence", nearest)
     others = [
         ("restarts", counts["restarts"]),
         ("other frames", picture.foreign),
