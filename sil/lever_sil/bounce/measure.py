@@ -11,6 +11,7 @@ import numpy as np
 from lever_cdkf.firmware.library import lib
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 
+from .. import measures
 from ..acceptance.result import Figure, largest, least, mean
 from ..aircraft.stability import critical_gearing
 from ..fast import plants
@@ -175,8 +176,8 @@ def _margins(flown: Flown) -> Figures:
     error = said["gain_margin"] - true
     near = stated & (np.abs(true) < 6.0)
     return {
-        "margin covered": 100.0 * float(np.mean((np.abs(error) <= 2.0 * said["gain_margin_sigma"])[stated])),
-        "margin rms": float(np.sqrt(np.mean(error[near] ** 2))) if near.any() else math.nan,
+        "margin covered": 100.0 * float(measures.covered(error[stated], said["gain_margin_sigma"][stated])),
+        "margin rms": float(measures.rms(error[near])) if near.any() else math.nan,
         "margin stated": 100.0 * float(np.sum(stated) / max(1, np.sum(judged))),
     }
 
@@ -394,7 +395,8 @@ def _total(values: FloatArray) -> float:
 
 
 def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))
+    """Of runs; NaN where one has none."""
+    return float(measures.rms(values[~np.isnan(values)]))
 
 
 FIGURES: Mapping[str, Figure] = {

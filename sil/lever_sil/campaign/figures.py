@@ -8,9 +8,9 @@ import numpy as np
 from lever_cdkf.firmware.quantities import parameters, quantities
 from lever_cdkf.numeric.arrays import Array
 
+from ..measures import covered, normalised_squares, rms
 from ..run.summary import times_to
 from ..study.data import PARAMETERS
-from ..study.scores import normalised_squares
 from .entrants import Track
 from .flight import Flight
 
@@ -46,15 +46,16 @@ def of_run(flight: Flight, track: Track, run: int) -> Figures:
     truth, sigma = flight.truth, track.sigma[run]
     with np.errstate(invalid="ignore"):
         relative = values / truth - 1.0
-        covered = np.abs(values - truth) <= 2.0 * sigma
     figures: Figures = {}
     for index, name in enumerate(each.key for each in quantities(flight.scenario.config.choices["model"])):
         finite = counted & np.isfinite(truth[:, index])
         error, is_known = relative[finite, index], bool(finite.any())
-        figures[f"rms_{name}"] = float(np.sqrt(np.mean(np.square(error)))) if is_known else None
+        figures[f"rms_{name}"] = float(rms(error)) if is_known else None
         figures[f"bias_{name}"] = float(np.mean(error)) if is_known else None
         is_stated = is_known and np.isfinite(sigma[:, index]).all()
-        figures[f"coverage_{name}"] = float(np.mean(covered[finite, index])) if is_stated else None
+        figures[f"coverage_{name}"] = (
+            float(covered((values - truth)[finite, index], sigma[finite, index])) if is_stated else None
+        )
     figures["nees"] = _nees(flight, track, run)
     figures["nis"] = None if track.nis is None else _mean_known(track.nis[run][counted])
     times = times_to(relative[:, FREQUENCY], flight.time, flight.scenario.changes(), WITHIN)

@@ -6,15 +6,14 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST
 from lever_cdkf.firmware.library import lib
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
-from lever_cdkf.report.series import runs
 from numpy.typing import NDArray
 
+from .. import measures
 from ..acceptance import result as acceptance
 from ..acceptance.result import Values, largest, mean
 from ..batch.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
@@ -22,8 +21,6 @@ from ..batch.motions import Recording
 from .condition import FOLLOWED
 
 QUANTITIES = ("f_n", "zeta", *PARAMETERS)
-WRONG = 3.0
-"""An error of more standard deviations is wrong, unless it is flagged."""
 WITHIN = 0.05
 """Settled is a natural frequency that stays within so much of the truth."""
 _CALM = 0.5  # [s] without a flag: the firmware is back
@@ -73,8 +70,7 @@ class Outcome:
 
     def flagged(self, mask: int = DO_NOT_TRUST) -> BoolArray:
         """Where the firmware shows any of these faults."""
-        shown: BoolArray = (self.track.faults & mask) != 0
-        return shown
+        return measures.is_flagged(self.track.faults, mask)
 
 
 def _percent(true: BoolArray, axis: int | tuple[int, ...] = 0) -> Values:
@@ -82,18 +78,16 @@ def _percent(true: BoolArray, axis: int | tuple[int, ...] = 0) -> Values:
     return share
 
 
-def _percent_rms(errors: NDArray[Any], axis: int | tuple[int, ...] = 0) -> Values:
-    """Return the percent rms of real or complex errors."""
-    rms: Values = 100.0 * np.sqrt(np.mean(np.abs(errors) ** 2, axis=axis))
-    return rms
-
-
 def _rms(quantity: str, outcome: Outcome) -> Values:
-    return _percent_rms((outcome.error(quantity) / outcome.recording.truth[quantity])[outcome.judged])
+    relative = outcome.error(quantity) / outcome.recording.truth[quantity]
+    percent: Values = 100.0 * measures.rms(relative[outcome.judged], axis=0)
+    return percent
 
 
 def _covered(quantity: str, outcome: Outcome) -> Values:
-    return _percent(outcome.deviation(quantity)[outcome.judged] <= 2.0)
+    error, sigma = outcome.error(quantity), outcome.track.sigma[quantity]
+    percent: Values = 100.0 * measures.covered(error[outcome.judged], sigma[outcome.judged], axis=0)
+    return percent
 
 
 def _largest(quantity: str, outcome: Outcome) -> Values:
@@ -114,13 +108,13 @@ def _unflagged(outcome: Outcome) -> Values:
 
 def _silent(outcome: Outcome) -> Values:
     """Return seconds in a row."""
-    wrong = _unflagged_deviation(outcome) > WRONG
+    wrong = _unflagged_deviation(outcome) > measures.WRONG
     step = outcome.track.time[1] - outcome.track.time[0]
-    return np.array([step * max((last - first + 1 for first, last in runs(each)), default=0) for each in wrong.T])
+    return np.array([step * measures.longest(each) for each in wrong.T])
 
 
 def _silent_share(outcome: Outcome) -> Values:
-    return _percent(_unflagged_deviation(outcome) > WRONG)
+    return _percent(_unflagged_deviation(outcome) > measures.WRONG)
 
 
 def _changes(outcome: Outcome) -> Values:
@@ -143,12 +137,9 @@ def _settled(outcome: Outcome) -> Values:
     """From the end of the last event until the error stays small."""
     start = outcome.events[-1][1]
     after = outcome.during(start, start + outcome.followed)
-    wrong = (np.abs(outcome.error("f_n")) > WITHIN * outcome.recording.truth["f_n"])[after]
-    time = outcome.track.time[after] - start
-    step = time[1] - time[0]
-    last = np.where(wrong, time[:, None] + step, 0.0).max(axis=0)
-    settled: Values = np.where(wrong[-1], math.inf, last)
-    return settled
+    relative = (outcome.error("f_n") / outcome.recording.truth["f_n"])[after]
+    settled = measures.settling_times(relative.T, outcome.track.time[after] - start, WITHIN)
+    return np.where(np.isnan(settled), math.inf, settled)
 
 
 def _lag(outcome: Outcome) -> Values:
@@ -179,8 +170,7 @@ def _back(outcome: Outcome) -> Values:
         shown = outcome.flagged(DO_NOT_TRUST | fault_mask("SETTLING"))[after]
         time = outcome.track.time[after] - end
         calm = round(_CALM / (time[1] - time[0]))
-        run = np.lib.stride_tricks.sliding_window_view(shown, calm, axis=0).any(axis=-1)
-        delays.append(np.where(run.all(axis=0), math.inf, time[run.argmin(axis=0)]))
+        delays.append(time[0] + (time[1] - time[0]) * measures.first_without(shown.T, calm))
     slowest: Values = np.max(delays, axis=0)
     return slowest
 
@@ -232,7 +222,8 @@ def _response_rms(outcome: Outcome) -> Values:
     """Over times and frequencies, relative to the rms of the truth over the band."""
     truth, stated = _judged_feedthrough(outcome)
     scale = np.sqrt(np.mean(np.abs(truth) ** 2, axis=-1, keepdims=True))
-    return _percent_rms((stated.response - truth) / scale, (0, 2))
+    percent: Values = 100.0 * measures.rms((stated.response - truth) / scale, axis=(0, 2))
+    return percent
 
 
 def _response_covered(outcome: Outcome) -> Values:
@@ -280,8 +271,8 @@ def _figures() -> dict[str, Figure]:
     return figures | {
         "flagged": _figure("%", "share of time with a fault that forbids trust", partial(_share, DO_NOT_TRUST), mean),
         "unflagged": _figure("σ", "largest error of a quantity without such a fault", _unflagged, largest),
-        "silent": _figure("s", f"longest time with it above {WRONG:g} σ", _silent, largest),
-        "silent share": _figure("%", f"share of time with it above {WRONG:g} σ", _silent_share, mean),
+        "silent": _figure("s", f"longest time with it above {measures.WRONG:g} σ", _silent, largest),
+        "silent share": _figure("%", f"share of time with it above {measures.WRONG:g} σ", _silent_share, mean),
         "changes": _figure("1/h", "how often CHANGE begins", _changes, mean),
         **{
             f"{name} share": _figure("%", f"share of time with {name}", partial(_share, fault_mask(name)), mean)

@@ -11,7 +11,8 @@ from lever_cdkf.report.figure import Figure, axis, band, dots, line, time_axis
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table
 
-from .judge import BACK, ERROR, RIGHT, SIGMAS, SILENT, Excerpt
+from ..measures import WRONG
+from .judge import BACK, ERROR, RIGHT, SILENT, Excerpt
 from .matrix import RowResult
 from .rows import KNOWN
 from .table import HOLDS, demands, lines, missed, state
@@ -89,13 +90,13 @@ def _section(page: Page, result: RowResult) -> None:
 
 def _chart(shown: Excerpt, result: RowResult) -> Figure:
     """Return what was longest wrong, over time; dots at the foot where a flag says so."""
-    low, high = shown.value - SIGMAS * shown.sigma, shown.value + SIGMAS * shown.sigma
+    low, high = shown.value - WRONG * shown.sigma, shown.value + WRONG * shown.sigma
     values = np.concatenate((shown.truth, shown.value[np.isfinite(shown.value)]))
     floor, ceiling = 0.8 * float(np.percentile(values, 1.0)), 1.2 * float(np.percentile(values, 99.0))
     figure = Figure(
         [axis(_NAMES[shown.quantity], range=[floor, ceiling])], time_axis(float(shown.time[-1])), height=260
     )
-    figure.add(*band(shown.time, low, high, f"estimate ±{SIGMAS:g}σ", "estimate-band"))
+    figure.add(*band(shown.time, low, high, f"estimate ±{WRONG:g}σ", "estimate-band"))
     figure.add(line(shown.time, shown.truth, "truth", "truth", line_dash="dash", zorder=1))
     figure.add(line(shown.time, shown.value, "estimate", "estimate"))
     if shown.flagged.any():
@@ -107,8 +108,8 @@ def _chart(shown: Excerpt, result: RowResult) -> Figure:
 
 def _legend() -> str:
     return " ".join((
-        f"<p>Of every fault, besides: estimates are finite; none is off by more than {SIGMAS:g}σ for {SILENT:g} s",
-        f"without a flag, and {RIGHT:g} % of the samples without a flag are within {SIGMAS:g}σ; each sample is",
+        f"<p>Of every fault, besides: estimates are finite; none is off by more than {WRONG:g}σ for {SILENT:g} s",
+        f"without a flag, and {RIGHT:g} % of the samples without a flag are within {WRONG:g}σ; each sample is",
         f"answered; torque keeps its limits; the firmware learns again {BACK:g} s after the fault and knows the",
         f"natural frequency to {ERROR:g} % in the last 5 s. Flagged is any of {', '.join(fault_names(DO_NOT_TRUST))},",
         "a mode without estimates, and silence.</p>",

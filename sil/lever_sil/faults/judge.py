@@ -7,11 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from lever_cdkf.firmware.estimator import DO_NOT_TRUST
 from lever_cdkf.firmware.library import enum_names, lib
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
-from lever_cdkf.report.series import runs
 
+from .. import measures
 from ..batch.motions import PERIOD, STRIDE
 from ..envelope.measure import QUANTITIES, fault_mask
 from .bus import Interval
@@ -21,8 +20,6 @@ GONE = (
     *("THETA", "THETA_DOT", "TORQUE", "BASE", "GAP", "COMMUNICATION", "CLOCK", "SETTLING", "RECOVERED", "HANDS_OFF"),
 )
 """With none of these the firmware is back: it learns. What its other verdicts remember is up to 20 s old."""
-SIGMAS = 3.0
-"""An error of more is wrong, unless it is flagged."""
 SILENT = 1.0
 """Wrong without a flag for so long [s] is too long,"""
 RIGHT = 99.0
@@ -101,16 +98,16 @@ def judge(
         changed = np.count_nonzero(record.estimate.view(np.uint8) != plain.estimate.view(np.uint8))
         verdict.hold("estimates changed", float(changed), 0)
     if requirement.flags:
-        shown = (faults[begin:end] & fault_mask(*requirement.flags)) != 0
+        shown = measures.is_flagged(faults[begin:end], fault_mask(*requirement.flags))
         verdict.hold("to flag", float(shown.argmax()) + 1 if shown.any() else math.inf, requirement.within)
     if requirement.after:
-        shown = (faults[end : end + 3] & fault_mask(*requirement.after)) != 0
+        shown = measures.is_flagged(faults[end : end + 3], fault_mask(*requirement.after))
         verdict.hold("to flag after", float(shown.argmax()) + 1 if shown.any() else math.inf, 2)
     mode = enum_names("lever_mode")[int(modes[end - 1])]
     if mode not in requirement.mode:
         verdict.broken.append(f"mode {mode}")
     flagged = is_flagged(record)
-    away = ((faults & fault_mask(*GONE)) != 0) | ~is_estimating(record)
+    away = measures.is_flagged(faults, fault_mask(*GONE)) | ~is_estimating(record)
     verdict.hold("back", _back(away, end), BACK)
     _judge_errors(record, truth, flagged, begin, verdict)
     return verdict
@@ -128,7 +125,7 @@ def is_flagged(record: Record) -> BoolArray:
     health = record.health
     taken = np.diff(health["samples"].astype(np.int64), prepend=0) != 0
     since = np.arange(len(taken)) - np.maximum.accumulate(np.where(taken, np.arange(len(taken)), 0))
-    flagged: BoolArray = ((health["faults"] & DO_NOT_TRUST) != 0) | ~is_estimating(record) | (since >= UNHEARD)
+    flagged: BoolArray = measures.is_flagged(health["faults"]) | ~is_estimating(record) | (since >= UNHEARD)
     return flagged
 
 
@@ -159,8 +156,7 @@ def _back(away: BoolArray, end: int) -> float:
     calm = round(CALM / PERIOD)
     if len(after) < calm:
         return 0.0  # the fault lasts to the end
-    run = np.lib.stride_tricks.sliding_window_view(after, calm).any(axis=-1)
-    return math.inf if run.all() else float(run.argmin()) * PERIOD
+    return float(measures.first_without(after, calm)) * PERIOD
 
 
 def _judge_errors(
@@ -172,8 +168,8 @@ def _judge_errors(
     shown[:first] = False
     silent, covered = dict.fromkeys(QUANTITIES, 0.0), 100.0
     for name in QUANTITIES:
-        wrong = deviation(record, truth, name) > SIGMAS
-        silent[name] = longest(wrong & shown) * PERIOD * STRIDE
+        wrong = deviation(record, truth, name) > measures.WRONG
+        silent[name] = measures.longest(wrong & shown) * PERIOD * STRIDE
         if shown.any():
             covered = min(covered, 100.0 * float(np.mean(~wrong[shown])))
     worst = max(silent, key=silent.__getitem__)
@@ -182,7 +178,7 @@ def _judge_errors(
     verdict.excerpt = _excerpt(record, truth, flagged, worst)
     last = round(AT_LAST / PERIOD / STRIDE)
     relative = (record.estimate["natural_frequency"] / truth["f_n"] - 1.0)[-last:]
-    verdict.hold("error after", 100.0 * math.sqrt(float(np.mean(relative.astype(np.float64) ** 2))), ERROR)
+    verdict.hold("error after", 100.0 * float(measures.rms(relative.astype(np.float64))), ERROR)
 
 
 def _excerpt(
@@ -210,8 +206,3 @@ def _stated(record: Record, name: str) -> tuple[FloatArray, FloatArray]:
         return estimate[of], estimate[f"{of}_sigma"]
     i = QUANTITIES.index(name) - 2
     return estimate["parameter"][:, i], estimate["parameter_sigma"][:, i]
-
-
-def longest(true: BoolArray) -> int:
-    """Most in a row."""
-    return max((last - first + 1 for first, last in runs(true)), default=0)

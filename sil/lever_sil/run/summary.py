@@ -29,6 +29,7 @@ from lever_cdkf.results.summary import (
 from lever_cdkf.results.trace import Trace
 from lever_cdkf.results.whiteness import Whiteness
 
+from .. import measures
 from ..scenarios.scenario import Scenario
 from .loop import Recording
 
@@ -122,9 +123,9 @@ def _quality(quantity: Quantity, scenario: Scenario, trace: Trace) -> Quality:
     if not judged.any():
         return Quality(None, None, None, *reached)
     return Quality(
-        rms_percent=100.0 * float(np.sqrt(np.mean(np.square(relative[judged])))),
+        rms_percent=100.0 * float(measures.rms(relative[judged])),
         bias_percent=100.0 * float(np.mean(relative[judged])),
-        coverage_2sigma=float(np.mean(np.abs(error[judged]) <= 2.0 * sigma[judged])),
+        coverage_2sigma=float(measures.covered(error[judged], sigma[judged])),
         time_to_10_percent_s=reached[0],
         time_to_5_percent_s=reached[1],
     )
@@ -145,10 +146,9 @@ def times_to(relative: FloatArray, time: FloatArray, changes: tuple[float, ...],
     """
     times: list[float | None] = []
     for begin, end in zip(changes, (*changes[1:], math.inf), strict=True):
-        part = np.flatnonzero((time >= begin) & (time < end))
-        outside = np.flatnonzero(~(np.abs(relative[part]) <= within))
-        first = int(outside[-1]) + 1 if len(outside) else 0
-        times.append(round(float(time[part[first]]) - begin, 9) if first < len(part) else None)
+        part = (time >= begin) & (time < end)
+        settled = float(measures.settling_times(relative[np.newaxis, part], time[part] - begin, within)[0])
+        times.append(None if math.isnan(settled) else round(settled, 9))
     return times
 
 

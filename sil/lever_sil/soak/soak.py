@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 from lever_cdkf.firmware.config import Config
-from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator
+from lever_cdkf.firmware.estimator import Estimator
 from lever_cdkf.firmware.library import lib
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from lever_cdkf.report.series import runs
 from numpy.typing import NDArray
 
+from .. import measures
 from ..fast.closed_loop import STRIDE, Loop
-from ..faults.judge import SIGMAS
 from ..run.summary import judged_samples
 from ..scenarios import inputs as scenario_inputs
 from ..scenarios.scenario import Scenario
@@ -33,7 +33,7 @@ GROWTH = 20.0
 SETTLED = 4
 """Flights, after which it should have what it needs."""
 WRONG = 1.0
-"""An estimate that is beyond SIGMAS without a flag for longer [s] is a silent error."""
+"""An estimate that is wrong (measures.WRONG) without a flag for longer [s] is a silent error."""
 
 Show = Callable[[int, int], None]
 
@@ -56,7 +56,7 @@ class Sums:
     within: dict[str, int] = field(default_factory=lambda: dict.fromkeys(QUANTITIES, 0))
     """Truth within 2 sigma."""
     silent_s: float = 0.0
-    """In stretches of more than WRONG with some quantity beyond SIGMAS."""
+    """In stretches of more than WRONG with some quantity beyond measures.WRONG."""
     not_finite: int = 0
     in_fault: int = 0
     """Looks in mode FAULT."""
@@ -181,7 +181,7 @@ def judge(scenario: Scenario, time: FloatArray, truth: Any, estimates: NDArray[A
     values = {**truth.parameters, **vars(truth.dynamics)}
     judged = judged_samples(scenario, time) & np.isfinite(values["natural_frequency"])
     running = (healths["mode"] == lib.LEVER_MODE_RUN) | (healths["mode"] == lib.LEVER_MODE_FROZEN)
-    unflagged = judged & running & ((healths["faults"] & DO_NOT_TRUST) == 0)
+    unflagged = judged & running & ~measures.is_flagged(healths["faults"])
     sums = Sums(looks=len(time), judged=int(judged.sum()), unflagged=int(unflagged.sum()))
     sums.in_fault = int(np.sum(healths["mode"] == lib.LEVER_MODE_FAULT))
     sums.not_finite = int(sum(np.sum(~np.isfinite(estimates[name])) for name in ("parameter", "parameter_sigma")))
@@ -189,7 +189,7 @@ def judge(scenario: Scenario, time: FloatArray, truth: Any, estimates: NDArray[A
     for name, error, sigma in _errors(values, estimates):
         size = np.abs(error) / sigma
         sums.within[name] = int(np.sum(size[unflagged] <= 2.0))
-        beyond |= size > SIGMAS
+        beyond |= size > measures.WRONG
     sums.silent_s = _stretches(beyond & unflagged) * STRIDE
     sums.nees = float(np.sum(_nees(values, estimates)[unflagged]))
     sizes = estimates["nis_size"][unflagged]
@@ -210,14 +210,11 @@ def _nees(values: dict[str, FloatArray], estimates: NDArray[Any]) -> FloatArray:
     with np.errstate(all="ignore"):
         error = np.log(estimate / np.stack([values[name] for name in PARAMETERS], axis=-1))
         scaled = error * estimate / estimates["parameter_sigma"]
-    correlation = np.tile(np.eye(3), (len(estimate), 1, 1))
-    for place, (i, j) in enumerate(((0, 1), (0, 2), (1, 2))):
-        correlation[:, i, j] = correlation[:, j, i] = estimates["parameter_correlation"][:, place]
+    correlation = measures.covariance_of(np.ones_like(scaled), estimates["parameter_correlation"])
     usable = np.isfinite(scaled).all(axis=1) & (np.linalg.det(correlation) > 1e-9)
-    nees = np.full(len(estimate), np.nan)
-    solved = np.linalg.solve(correlation[usable], scaled[usable][:, :, np.newaxis])[:, :, 0]
-    nees[usable] = (scaled[usable] * solved).sum(axis=1) / 3.0
-    return np.where(np.isnan(nees), 0.0, nees)
+    nees = np.zeros(len(estimate))
+    nees[usable] = measures.normalised_squares(scaled[usable], correlation[usable]) / 3.0
+    return nees
 
 
 def _stretches(wrong: BoolArray) -> int:

@@ -7,13 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from lever_cdkf.firmware.native import Config, run_samples
-from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
-from .data import PARAMETERS, Batch, Estimates
-
-_PAIRS = ((0, 1), (0, 2), (1, 2))  # of parameter_correlation
-
+from ..measures import covariance_of
+from .data import Batch, Estimates
 
 EXACT = dict.fromkeys(("z_ddot_gain_sigma", "z_ddot_delay_sigma", "tau_m_gain_sigma", "lever_friction_sigma"), 0.0)
 """Settings for data whose inputs are measured without errors, of a lever without friction."""
@@ -52,13 +49,3 @@ class Firmware:
 
 
 _COLUMNS = ("parameter", "parameter_sigma", "parameter_correlation", "nis", "recoveries")
-
-
-def covariance_of(sigma: Array, correlation: Array) -> Array:
-    """Return (B, T, 3, 3) of standard deviations (B, T, 3) and correlations of _PAIRS (B, T, 3)."""
-    matrix = np.zeros((*sigma.shape, PARAMETERS))
-    matrix[..., range(PARAMETERS), range(PARAMETERS)] = 1.0
-    for index, (i, j) in enumerate(_PAIRS):
-        matrix[..., i, j] = matrix[..., j, i] = correlation[..., index]
-    covariance: Array = matrix * sigma[..., :, None] * sigma[..., None, :]
-    return covariance

@@ -21,6 +21,7 @@ from lever_cdkf.models.lever import Lever
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.text.units import GRAVITY
 
+from .. import measures
 from ..plants.excitation import Noise, Rotor
 from .draws import streams
 from .steps import LONGEST_SUBSTEP, follow
@@ -177,7 +178,7 @@ def firmware(y: Array, truth: Array) -> tuple[Found, Array]:
         spread = [float(said[f"{name}_sigma"][-1]) / value for name, value in last.items()]
         errors.append((last["natural_frequency"] / f_n - 1.0, last["damping_ratio"] / zeta - 1.0))
         sigmas.append(spread)
-        flagged.append(float(np.mean((said["faults"].astype(np.int64) & BASE_FAULT) != 0)))
+        flagged.append(float(np.mean(measures.is_flagged(said["faults"], BASE_FAULT))))
     return Found(np.array(errors), np.array(sigmas)), np.array(flagged)
 
 
@@ -194,7 +195,7 @@ def rows(count: int = SEEDS, duration: float = DURATION) -> list[Row]:
 
 def _row(base: str, assumed: str, found: Found) -> Row:
     error = 100.0 * np.abs(found.error)
-    covered = 100.0 * np.mean(np.abs(found.error) <= 2.0 * found.sigma, axis=0)
+    covered = 100.0 * measures.covered(found.error, found.sigma, axis=0)
     cells: dict[str, Cell] = {"base": base, "assumed of it": assumed}
     for index, name in enumerate(("f_n", "ζ")):
         cells[f"{name}: error [%]"] = f"{np.median(error[:, index]):.1f} / {np.max(error[:, index]):.1f}"

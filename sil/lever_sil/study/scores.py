@@ -1,4 +1,4 @@
-"""How good estimates are: errors against references, stated against actual covariances, time to converge.
+"""How good estimates are: errors against references, stated against actual covariances; measures.py has the rest.
 
 All functions are pure and take arrays with runs first and times second, so that a window of time is a slice. The tests
 on normalised squares of errors (NEES) and of innovations (NIS) are those of Y. Bar-Shalom, X. R. Li, T. Kirubarajan,
@@ -14,6 +14,7 @@ import numpy as np
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.numeric.quantiles import chi_square_band
 
+from ..measures import rms
 from .data import Batch, Estimates
 
 # --- errors ----------------------------------------------------------------------------------------------------------
@@ -33,12 +34,6 @@ def errors(batch: Batch, estimates: Estimates) -> Array:
     return np.concatenate((estimates.w - batch.knowledge.scaled(truth.p[:, at]), relative), axis=-1)
 
 
-def rms(deviations: Array) -> Array:
-    """Return (n,) over runs and times of errors (B, T, n)."""
-    mean: Array = np.sqrt(np.mean(np.square(deviations), axis=(0, 1)))
-    return mean
-
-
 # --- against references ----------------------------------------------------------------------------------------------
 
 
@@ -49,7 +44,8 @@ def ratio(deviations: Array, variances: Array) -> Array:
     With the squares of another estimator's errors for `variances`: how the two compare. On the same data that ratio has
     the smaller spread, as most of what chance does, it does to both.
     """
-    quotient: Array = rms(deviations) / np.sqrt(np.mean(np.broadcast_to(variances, deviations.shape), axis=(0, 1)))
+    stated = np.broadcast_to(variances, deviations.shape)
+    quotient: Array = rms(deviations, axis=(0, 1)) / np.sqrt(np.mean(stated, axis=(0, 1)))
     return quotient
 
 
@@ -82,16 +78,6 @@ def sigma_ratio(deviations: Array, variances: Array) -> Array:
     """Return (n,) what an estimator claims ÷ what it does: root of the mean of its variances (B, T, n) ÷ rms of its
     errors."""
     return 1.0 / ratio(deviations, variances)
-
-
-def normalised_squares(deviations: Array, covariance: Array) -> Array:
-    """Return (B, T) eᵀ P⁻¹ e of errors (B, T, n) with stated covariances (B, T, n, n): NEES; infinite for a singular
-    one."""
-    regular = np.linalg.slogdet(covariance).sign != 0.0
-    invertible = np.where(regular[..., None, None], covariance, np.eye(covariance.shape[-1]))
-    squares: Array = np.einsum("bti,bti->bt", deviations, np.linalg.solve(invertible, deviations[..., None])[..., 0])
-    squares[~regular] = np.inf
-    return squares
 
 
 @dataclass(frozen=True)
@@ -127,20 +113,6 @@ def consistency(squares: Array, freedom: int) -> Consistency:
 
 
 # --- convergence -----------------------------------------------------------------------------------------------------
-
-
-def settling_times(relative: Array, elapsed: Array, within: float = 0.05) -> Array:
-    """Return (B,) time [s] from which on each run's |error| (B, T) stays <= `within` to the end; NaN if it never does.
-
-    `elapsed` (T,) [s] counts from the change that is to be followed; what lies before it does not matter. A time
-    without an estimate (NaN) counts as outside.
-    """
-    after = elapsed >= 0.0
-    outside = ~(np.abs(relative[:, after]) <= within)
-    backwards = outside[:, ::-1]
-    first = np.where(outside.any(axis=1), backwards.shape[1] - backwards.argmax(axis=1), 0)
-    times: Array = np.append(elapsed[after], np.nan)[first]
-    return times
 
 
 def median_and_worst(times: Array) -> tuple[float, float]:

@@ -102,11 +102,6 @@ def test_readings_are_spoilt_as_the_fault_says() -> None:
     assert spoilt(readings.clock_offset(1.0)).time_us.tolist()[1:3] == [1000, 1002000]
 
 
-def test_longest() -> None:
-    assert judge.longest(np.array([True, False, True, True, False])) == 2
-    assert judge.longest(np.array([False])) == 0
-
-
 def test_the_command_writes_its_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "rows.json"
     only = ["--only", "theta_stuck", "foreign_load", "--seeds", "1"]

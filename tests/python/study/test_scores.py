@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lever_sil import measures
 from lever_sil.study import scores
 from lever_sil.study.data import Estimates
 from lever_sil.study.matched import Condition, matched
@@ -51,7 +52,6 @@ def test_of_a_truth_outside_the_model_only_the_dynamics_are_judged() -> None:
 def test_rms_and_ratio_of_numbers_made_by_hand() -> None:
     deviations = np.array([[[3.0, 1.0], [-4.0, 1.0]], [[0.0, -1.0], [5.0, 1.0]]])  # mean squares 12.5, 1
     variances = np.array([[[2.0, 4.0], [4.0, 4.0]], [[1.0, 4.0], [5.5, 4.0]]])  # means 3.125, 4
-    np.testing.assert_allclose(scores.rms(deviations), [np.sqrt(12.5), 1.0])
     np.testing.assert_allclose(scores.ratio(deviations, variances), [2.0, 0.5])
     np.testing.assert_allclose(scores.sigma_ratio(deviations, variances), [0.5, 2.0])
 
@@ -104,39 +104,12 @@ def test_a_filter_that_lies_about_its_sigma_is_found_out(claim: float) -> None:
     rng = np.random.default_rng(9)
     normal = np.stack([correlated(rng, 40, 400, 0.95) for _ in range(3)], axis=-1)
     covariance = np.broadcast_to(claim**2 * np.eye(3), (40, 400, 3, 3))
-    found = scores.consistency(scores.normalised_squares(normal, covariance), 3)
+    found = scores.consistency(measures.normalised_squares(normal, covariance), 3)
     assert not found.consistent
     assert found.inside < 0.8
     assert found.mean == pytest.approx(3.0 / claim**2, rel=0.1)
     sigma_ratio = scores.sigma_ratio(normal, np.diagonal(covariance, axis1=-2, axis2=-1))
     np.testing.assert_allclose(sigma_ratio, claim, rtol=0.1)
-
-
-def test_a_filter_that_states_a_singular_covariance_is_infinitely_wrong() -> None:
-    covariance = np.stack([np.eye(2), np.ones((2, 2))])[None]
-    np.testing.assert_array_equal(scores.normalised_squares(np.ones((1, 2, 2)), covariance), [[2.0, np.inf]])
-
-
-# --- convergence -----------------------------------------------------------------------------------------------------
-
-ELAPSED = np.arange(-2.0, 8.0)  # the change is at index 2
-
-
-@pytest.mark.parametrize(
-    ("relative", "settled"),
-    [
-        ([0, 0, 0.30, 0.20, 0.05, 0.04, 0.03, 0.02, 0.01, 0.01], 2.0),  # the limit itself is inside
-        ([0, 0, 0.30, -0.04, 0.04, 0.06, 0.03, 0.02, 0.01, 0.01], 4.0),  # out once more
-        ([0, 0, 0.30, -0.20, -0.06, -0.05, 0, 0, 0, 0], 3.0),  # from below
-        ([9, 9, 0.01, 0.01, 0.02, 0.01, 0.00, 0.01, 0.01, 0.01], 0.0),  # at once; what was before does not count
-        ([0, 0, 0.30, 0.04, 0.04, 0.04, 0.04, 0.04, 0.04, 0.06], np.nan),  # out at the end
-        ([0, 0, 0.30, 0.04, 0.04, np.nan, 0.04, 0.04, 0.04, 0.01], 4.0),  # a time without an estimate
-        ([0, 0, 0.30, 0.04, 0.04, 0.04, 0.04, np.nan, np.nan, np.nan], np.nan),  # broken down
-    ],
-)
-def test_settling_time(relative: list[float], settled: float) -> None:
-    both = np.array([relative, np.full(10, 0.5)])
-    np.testing.assert_array_equal(scores.settling_times(both, ELAPSED), [settled, np.nan])
 
 
 def test_median_and_worst() -> None:

@@ -11,8 +11,8 @@ import numpy as np
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.report.figure import SERIES, Figure, Spec, axis, band, dots, line
 
+from ...measures import settling_times
 from ..baselines import BASELINES
-from ..scores import settling_times
 from .cases import cases
 from .entrants import OURS, entrants
 from .evaluation import FREQUENCY, Row, quantities

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from lever_cdkf.numeric.arrays import Array, BoolArray
 
+from ... import measures
 from ..data import OUTPUTS, PARAMETERS
 from ..matched import KINDS
-from ..scores import Consistency, consistency, median_and_worst, ratio, ratio_spread, rms, settling_times, sigma_ratio
+from ..scores import Consistency, consistency, median_and_worst, ratio, ratio_spread, sigma_ratio
 from .cases import Case, References, cases
 from .comparison import Differences, corrected, of_errors, of_times
 from .entrants import Entrant, entrants
@@ -140,19 +141,19 @@ def _intact(outcome: Outcome) -> BoolArray:
 
 def _with_errors(row: Row, outcome: Outcome, intact: BoolArray, judged: BoolArray) -> Row:
     errors = outcome.errors[intact][:, judged]
-    size = rms(errors)
+    size = measures.rms(errors, axis=(0, 1))
     finite = size[np.isfinite(size)]
     relative = outcome.relative[intact][:, judged]
     row = replace(
         row,
-        rms=_five(rms(relative)),
+        rms=_five(measures.rms(relative, axis=(0, 1))),
         bias=_five(np.abs(relative.mean(axis=1)).mean(axis=0)),
         score=math.exp(float(np.log(finite).mean())),
     )
     if outcome.stated is None:
         return row
     stated = outcome.stated[intact][:, judged]
-    covered = np.mean(np.square(errors) <= 4.0 * stated, axis=(0, 1))
+    covered = measures.covered(errors, np.sqrt(stated), axis=(0, 1))
     return replace(row, sigma_ratio=_five(sigma_ratio(errors, stated)), covered=_five(covered))
 
 
@@ -209,7 +210,7 @@ def _times(results: Results, case: str, names: list[str], change: float) -> Mapp
     for name in names:
         outcome = results.outcomes[case, name]
         elapsed = outcome.time - change
-        times = settling_times(outcome.errors[..., FREQUENCY], elapsed)
+        times = measures.settling_times(outcome.errors[..., FREQUENCY], elapsed)
         by_name[name] = np.maximum(np.where(np.isnan(times), elapsed[-1], times), cases()[case].every)
     return by_name
 
@@ -233,7 +234,7 @@ def _consistent(squares: Array | None, freedom: int, intact: BoolArray, judged: 
 
 def settled(outcome: Outcome, change: float) -> tuple[float, float]:
     """Return median and worst time [s] after `change` [s] until the frequency is within 5 % for good; inf: never."""
-    median, worst = median_and_worst(settling_times(outcome.errors[..., FREQUENCY], outcome.time - change))
+    median, worst = median_and_worst(measures.settling_times(outcome.errors[..., FREQUENCY], outcome.time - change))
     return (math.inf if math.isnan(median) else median), (math.inf if math.isnan(worst) else worst)
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from lever_cdkf.cli.tables import Cell, Row
 from lever_cdkf.numeric.arrays import Array
 
+from ... import measures
 from ..data import PARAMETERS
-from ..scores import settling_times
 from .cases import Case, Paper, Plan, cases
 from .entrants import tuning_name, wrongly_tuned
 from .evaluation import FREQUENCY
@@ -80,15 +80,15 @@ def of_runs(outcome: Outcome, case: Case, plan: Plan) -> Figures:
     relative = outcome.relative[:, judged, :PARAMETERS]
     covered = np.full(len(relative), np.nan)
     if outcome.stated is not None:
-        inside = np.square(outcome.errors[:, judged]) <= 4.0 * outcome.stated[:, judged]
-        covered = inside[..., :PARAMETERS].mean(axis=1).min(axis=-1)
+        sigma = np.sqrt(outcome.stated[:, judged])
+        covered = measures.covered(outcome.errors[:, judged], sigma, axis=1)[..., :PARAMETERS].min(axis=-1)
     change = case.change(plan)
     elapsed = np.empty(0) if change is None else outcome.time - change
     return Figures(
-        np.sqrt(np.square(relative).mean(axis=(1, 2))),
+        measures.rms(relative, axis=(1, 2)),
         np.abs(relative.mean(axis=1)).max(axis=-1),
         covered,
-        settling_times(outcome.errors[..., FREQUENCY], elapsed) if len(elapsed) else elapsed,
+        measures.settling_times(outcome.errors[..., FREQUENCY], elapsed) if len(elapsed) else elapsed,
     )
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from lever_cdkf.cli.tables import Row
 from lever_cdkf.numeric.arrays import Array
 
+from ...measures import settling_times
 from ..data import PARAMETERS, Batch
-from ..scores import settling_times
 from .cases import SQUARE, Protocol, cases
 from .evaluation import FREQUENCY
 from .paper import pair

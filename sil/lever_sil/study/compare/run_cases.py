@@ -17,8 +17,9 @@ from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.runtime import interrupts
 from numpy.typing import NDArray
 
+from ...measures import normalised_squares
 from ..data import PARAMETERS, Batch, Estimates
-from ..scores import errors, normalised_squares
+from ..scores import errors
 from ..transitions import dynamics_gradient, with_dynamics
 from . import dataset
 from .cases import Case, Matched, Plan, References, cases

@@ -7,10 +7,11 @@ from lever_cdkf.models.lever import Lever
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.report.bode import FREQUENCIES, transfer
 
+from ...measures import rms
 from ..data import rest_angle
 from ..matched import Condition, matched
 from .description import Column, Figure, Surface, number, percent
-from .runs import PRIOR, Extent, estimates, late, matched_config, rms, shown
+from .runs import PRIOR, Extent, estimates, late, matched_config, shown
 
 _DRIFT = {"m_p_walk": 0.01, "c_p_walk": 0.06, "k_p_walk": 0.06}  # [1/√s]: stiffness by half in a minute
 _LENGTH = 3.0  # durations of the other figures: a drift takes its time

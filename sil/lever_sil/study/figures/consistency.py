@@ -6,10 +6,11 @@ import numpy as np
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.numeric.quantiles import chi_square_band
 
+from ...measures import normalised_squares
 from ..data import PARAMETERS
 from ..firmware import Firmware
 from ..matched import Condition, matched
-from ..scores import Consistency, consistency, errors, normalised_squares
+from ..scores import Consistency, consistency, errors
 from .description import Band, Column, Curve, Figure, Row, Trace, number, percent
 from .runs import DITHER, MATCHED, PRIOR, Extent, shown
 

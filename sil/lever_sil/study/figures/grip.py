@@ -10,11 +10,12 @@ from lever_cdkf.firmware.native import Config, lib
 from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
+from ...measures import covered, settling_times
 from ..data import Batch
 from ..matched import Condition, jump, matched, tightened
-from ..scores import median_and_worst, settling_times
+from ..scores import median_and_worst
 from .description import Band, Column, Curve, Figure, Row, interval, number, percent
-from .runs import DITHER, PRIOR, Extent, estimates, held, shown
+from .runs import DITHER, PRIOR, Extent, estimates, shown
 
 _FACTORS = np.array((1.0, 1.3, 1.3))  # of m_p, c_p, k_p
 _WITHIN = 0.1  # of the truth: when a change counts as followed
@@ -109,7 +110,7 @@ def _case_caption(title: str, case: _Case, truth: Array, elapsed: Array) -> str:
     relative = (case.value / truth - 1.0)[..., _STIFFNESS]
     median, worst = median_and_worst(settling_times(relative, elapsed, _WITHIN))
     after = (elapsed >= 0.0) & (elapsed < _WATCHED)
-    inside = held(*(part[:, after, _STIFFNESS] for part in (truth, case.value, case.sigma)))
+    inside = float(covered((case.value - truth)[:, after, _STIFFNESS], case.sigma[:, after, _STIFFNESS]))
     return (
         f"{title.capitalize()}, stiffness is within {percent(_WITHIN)} for good after {_seconds(median)} (median; "
         f"worst: {_seconds(worst)}), and in the first {number(_WATCHED)} s the band holds it in {percent(inside)} of "

@@ -13,10 +13,11 @@ from lever_cdkf.firmware.config import setting
 from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
+from ...measures import covered, rms
 from ..data import Batch
 from ..matched import KINDS, Condition, matched
 from .description import Band, Column, Curve, Figure, Points, Row, Trace, interval, number, percent
-from .runs import WILD, Extent, estimates, held, late, matched_config, rms, shown
+from .runs import WILD, Extent, estimates, late, matched_config, shown
 
 _PRIOR = {"m_sigma": 0.25, "c_sigma": 0.3, "k_sigma": 0.3, "lever_preload_angle": 0.0}
 _FORCE = 2.0  # [N] rms: in the acceleration of the mass about what the base does
@@ -85,7 +86,7 @@ def states(seed: int, extent: Extent) -> Figure:
         rows += _state_rows(time, window, f"{symbol} [{unit}]", (truth, measured, estimate, sigma))
         settled = late(np.arange(batch.samples, dtype=np.float64))
         off, noise = rms((estimate - truth)[settled]), rms((measured - truth)[settled])
-        inside = held(truth[settled], estimate[settled], sigma[settled])
+        inside = float(covered((estimate - truth)[settled], sigma[settled]))
         sentences.append(f"{symbol} {number(off)} {unit} rms against {number(noise)} {unit}, {percent(inside, 3)} held")
     caption = (
         "Position and rate of the linear physical model with process noise as the firmware reconstructs them (dual "
@@ -150,7 +151,7 @@ def _parameters(condition: Condition, seed: int, extent: Extent) -> list[tuple[R
         truth, estimate = batch.truth.p[0, at, index], estimated["parameter"][:, index]
         sigma, off = estimated["parameter_sigma"][:, index], rms((estimate - truth)[settled])
         row = Row(f"{symbol} [{unit}]", _tracked(time, truth, estimate, sigma))
-        parts.append((row, f"{symbol} {_with_unit(off, unit)} ({percent(held(truth, estimate, sigma), 3)})"))
+        parts.append((row, f"{symbol} {_with_unit(off, unit)} ({percent(float(covered(estimate - truth, sigma)), 3)})"))
     return parts
 
 

@@ -60,13 +60,3 @@ def late(time: Array) -> NDArray[np.bool_]:
     """Return the second half of a run, in which an estimator has found its way."""
     second: NDArray[np.bool_] = time >= 0.5 * (time[0] + time[-1])
     return second
-
-
-def rms(values: Array) -> float:
-    """Return root mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
-def held(truth: Array, estimate: Array, sigma: Array) -> float:
-    """Return share of values of the truth within estimate ± 2 sigma; about 0.95 if sigma is right."""
-    return float(np.mean(np.abs(truth - estimate) <= 2.0 * sigma))
