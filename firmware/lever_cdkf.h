@@ -131,10 +131,10 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance: 2,336 bytes, and as much more as pointers are longer than 32 bits. */
+/* Room for one instance: 2,376 bytes, and as much more as pointers are longer than 32 bits. */
 typedef struct lever_room {
     const void *pointers[4];
-    uint8_t rest[2320];
+    uint8_t rest[2360];
 } lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
@@ -323,7 +323,7 @@ void lever_correction(const lever_t *lever, lever_correction_t *correction);
 
 /* --- evidence --------------------------------------------------------------------------------------------------- */
 
-enum lever_evidence_limits { LEVER_TEST_RATIOS = 13 };
+enum lever_evidence_limits { LEVER_TEST_RATIOS = 14 };
 
 /* What is watched for faults and changes: each statistic over its threshold, as at the end of the last learn_period. Above
  * 1 it is evidence, until it falls below a second threshold; firmware/app/evidence.def has the list, in this order. */
@@ -339,8 +339,8 @@ const char *lever_parameter_unit(uint8_t model, uint32_t index);
 
 /* Conditions present at the last sample; none of them stops the estimator. HEALTH has those since the last HEALTH. */
 enum lever_fault {
-    LEVER_FAULT_THETA = 1,     /* theta missing, stuck or not plausible */
-    LEVER_FAULT_THETA_DOT = 2, /* theta_dot missing, stuck or not plausible */
+    LEVER_FAULT_THETA = 1,     /* theta missing, stuck or not plausible, or not the integral of theta_dot */
+    LEVER_FAULT_THETA_DOT = 2, /* theta_dot missing, stuck or not plausible, or not the derivative of theta */
     LEVER_FAULT_TORQUE = 4,    /* motor torque missing (taken as what was asked for), or not what was asked for */
     LEVER_FAULT_BASE = 8,      /* base acceleration missing or stuck (the last is held), or not fitting the motion */
     LEVER_FAULT_GAP = 16,      /* samples were missing */
@@ -475,7 +475,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 2025 };
+enum lever_state_limits { LEVER_STATE_BYTES = 2070 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

@@ -16,9 +16,15 @@
 #define BASE_DOUBT 0.35f       /* standard deviation of the gain up to which there may be doubt, */
 #define BASE_SURE 0.1f         /* standard deviation of the gain up to which it counts, */
 #define BASE_SURE_WRONG 0.2f   /* and while the base is wrong, when the state hardly follows it */
-#define TORQUE_MEMORY 0.5f     /* [s] */
+#define AGREEMENT_MEMORY 0.5f  /* of motor and kinematics [s] */
 #define TORQUE_MIN 4e-4f       /* mean square of the command from which on it says anything [N^2 m^2] */
 #define TORQUE_SURE 1.6f       /* torque of other origin over the command, both rms, that this is allowed times */
+#define KINEMATICS_CORNER 5.0f /* of the high-pass [rad/s] */
+#define KINEMATICS_STEP 0.03f  /* of the angle from sample to sample, from which on it is none of the lever [rad] */
+#define KINEMATICS_MIN 1e-6f   /* mean square of the integral from which on it says anything [rad^2] */
+#define KINEMATICS_BLOCK 0.02f /* more often than this the sums hardly get new information [s] */
+#define KINEMATICS_BLOCKS 4.0f /* from which on the gain has a standard deviation */
+#define KINEMATICS_SURE 2.5f   /* standard deviations that the gain may be off */
 #define OTHER_SHARE 0.01f      /* of its mean, by one sample in EVIDENCE_TORQUE_EVERY */
 #define OTHER_LEAST 2.5e-3f    /* mean square that is more than noise of the sensor [N^2 m^2] */
 #define AWAKE 0.3f             /* a rest lasts so much longer than the lack of motion [s] [rest_120s, freed] */
@@ -86,18 +92,39 @@ bool evidence_refuses_output(evidence_t *evidence, const cdkf_t *cdkf, uint32_t 
     return gate_refuses(&evidence->refused[i], far, elapsed);
 }
 
+static void agreement_add(agreement_t *agreement, float expected, float measured)
+{
+    agreement->expected += expected * expected;
+    agreement->measured += measured * measured;
+    agreement->product += expected * measured;
+}
+
 void evidence_add_torque(evidence_t *evidence, float commanded, float measured)
 {
-    agreement_t *torque = &evidence->torque;
-    torque->commanded += commanded * commanded;
-    torque->measured += measured * measured;
-    torque->product += commanded * measured;
-    torque->other += OTHER_SHARE * (((measured - commanded) * (measured - commanded)) - torque->other);
+    const float other = measured - commanded;
+    agreement_add(&evidence->torque, commanded, measured);
+    evidence->other_torque += OTHER_SHARE * ((other * other) - evidence->other_torque);
 }
 
 bool evidence_has_other_torque(const evidence_t *evidence)
 {
-    return evidence->torque.other > OTHER_LEAST;
+    return evidence->other_torque > OTHER_LEAST;
+}
+
+void evidence_add_outputs(evidence_t *evidence, const float y[CDKF_OUTPUTS], bool both, float elapsed, float period)
+{
+    kinematics_t *of = &evidence->kinematics;
+    const float turn = KINEMATICS_CORNER * elapsed;
+    const float change[2] = {y[0] - of->last[0], (0.5f * elapsed) * (y[1] + of->last[1])};
+    const bool on =
+        both && evidence->paired && (elapsed < (1.5f * period)) && (fabsf(change[0] - change[1]) < KINEMATICS_STEP);
+    for (uint32_t i = 0u; i < 2u; i++) {
+        of->passed[i] = on ? ((1.0f - turn) * (of->passed[i] + change[i])) : 0.0f;
+        of->level[i] = on ? (of->level[i] + (turn * (of->passed[i] - of->level[i]))) : 0.0f;
+    }
+    evidence->paired = both;
+    of->last[0] = y[0];
+    of->last[1] = y[1];
 }
 
 void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time)
@@ -171,20 +198,47 @@ static void trust_base(evidence_t *evidence)
     (void)evidence_set(evidence, EVIDENCE_BASE, 0.0f);
 }
 
+/* How far the gain of measured over expected is from 1, less `sure` times what else is measured, both rms. */
+static float agreement_away(const agreement_t *agreement, float sure)
+{
+    const float gain = agreement->product / agreement->expected;
+    const float other = (agreement->measured / agreement->expected) - (gain * gain); /* in squares */
+    return fabsf(gain - 1.0f) - (sure * sqrtf(greater(other, 0.0f)));
+}
+
+static void agreement_forget(agreement_t *agreement, float keep)
+{
+    agreement->expected *= keep;
+    agreement->measured *= keep;
+    agreement->product *= keep;
+}
+
 static void judge_motor(evidence_t *evidence, float period, float sample_period)
 {
-    agreement_t *torque = &evidence->torque;
-    float away = 0.0f;
-    if ((torque->commanded * sample_period) > (TORQUE_MIN * (TORQUE_MEMORY / (float)EVIDENCE_TORQUE_EVERY))) {
-        const float gain = torque->product / torque->commanded;
-        const float other = (torque->measured / torque->commanded) - (gain * gain); /* of other origin, in squares */
-        away = fabsf(gain - 1.0f) - (TORQUE_SURE * sqrtf(greater(other, 0.0f)));
+    const float least = TORQUE_MIN * (AGREEMENT_MEMORY / ((float)EVIDENCE_TORQUE_EVERY * sample_period));
+    const bool says = (evidence->torque.expected > least);
+    (void)evidence_set(evidence, EVIDENCE_MOTOR, says ? agreement_away(&evidence->torque, TORQUE_SURE) : 0.0f);
+    agreement_forget(&evidence->torque, 1.0f - share_of(period, AGREEMENT_MEMORY));
+}
+
+/* Angle against the integral of the rate. The gain's standard deviation is what else differs over the root of the number of
+ * blocks: the effective one of their weights (Kish 1965), as a few large ones may be most of the sum. */
+static void judge_kinematics(evidence_t *evidence, float period)
+{
+    kinematics_t *of = &evidence->kinematics;
+    const float integral = of->passed[1] - of->level[1];
+    const float square = integral * integral;
+    const float keep = 1.0f - share_of(period, AGREEMENT_MEMORY);
+    const float least = KINEMATICS_MIN * (AGREEMENT_MEMORY / period);
+    agreement_add(&of->agreement, integral, of->passed[0] - of->level[0]);
+    of->fourth = (keep * keep * of->fourth) + (square * square);
+    const float expected = of->agreement.expected;
+    const float blocks = (expected * expected) * lesser(period * (1.0f / KINEMATICS_BLOCK), 1.0f);
+    if ((expected > least) && (blocks > (KINEMATICS_BLOCKS * of->fourth))) { /* else it stays as it is */
+        const float sure = KINEMATICS_SURE * sqrtf(of->fourth / blocks);
+        (void)evidence_set(evidence, EVIDENCE_KINEMATICS, agreement_away(&of->agreement, sure));
     }
-    const float keep = 1.0f - share_of(period, TORQUE_MEMORY);
-    torque->commanded *= keep;
-    torque->measured *= keep;
-    torque->product *= keep;
-    (void)evidence_set(evidence, EVIDENCE_MOTOR, away);
+    agreement_forget(&of->agreement, keep);
 }
 
 /* A change of an arm that was known has to explain the innovations within its probation; otherwise noise has grown, where
@@ -240,12 +294,14 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     if (grip_force_judge(&evidence->force, setup, &hands, &force)) {
         (void)evidence_set(evidence, EVIDENCE_FORCE, force);
     }
-    if ((block->known || block->held) && !evidence_has(evidence, EVIDENCE_HANDS)) {
+    judge_motor(evidence, period, setup->settings->sample_period);
+    judge_kinematics(evidence, period);
+    if ((block->known || block->held) && !evidence_has(evidence, EVIDENCE_HANDS) &&
+        !evidence_has(evidence, EVIDENCE_KINEMATICS)) { /* what does not agree says nothing of the base */
         judge_base(evidence, &sudden, period);
     } else {
         trust_base(evidence);
     }
-    judge_motor(evidence, period, setup->settings->sample_period);
     judge_noise(evidence, block);
     judge_states(evidence, cdkf, block);
     (void)evidence_set(evidence, EVIDENCE_STICKING,

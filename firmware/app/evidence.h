@@ -6,6 +6,7 @@
  *   base     the response to the base acceleration is not about once what it should be: no sensor, the wrong sign, the
  *            wrong unit. By the score of a sudden error of the accelerometer's gain (filter/cdkf.h)
  *   motor    the measured torque does not follow the commanded one. By regression; other torque makes it less sure
+ *   kinematics  the angle is not the integral of the rate, whatever the arm. Likewise
  *   motion   the mean square of the measured rate without the noise of its sensor
  */
 #ifndef APP_EVIDENCE_H
@@ -35,13 +36,21 @@ typedef struct stillness {
     float still;  /* time for which it has been that [s] */
 } stillness_t;
 
-/* Of measured with commanded torque: sums over samples, with exponential forgetting [N^2 m^2]. */
+/* Of a signal with what it should be: sums of squares and products, with exponential forgetting [unit^2]. */
 typedef struct agreement {
-    float commanded;
+    float expected;
     float measured;
     float product;
-    float other; /* mean square of what the motor was not asked for, over the last seconds in which it was measured */
 } agreement_t;
+
+/* Angle, and rate integrated, through the same high-pass of second order [rad]: of an offset of either nothing is left. */
+typedef struct kinematics {
+    float passed[2];          /* the first order of the angle, of the integral, */
+    float level[2];           /* and the level of that */
+    float last[MODEL_STATES]; /* sample [rad], [rad/s] */
+    agreement_t agreement;    /* of the angle with the integral, */
+    float fourth;             /* sum of the integral to the fourth: how many blocks the agreement rests on */
+} kinematics_t;
 
 typedef struct motion {
     float slow;               /* mean square over excitation_time [rad^2/s^2], */
@@ -62,8 +71,11 @@ typedef struct evidence {
     float alive;                 /* time in which the base acceleration has changed all the time [s] */
     float refused[CDKF_OUTPUTS]; /* time for which samples of an output have been refused [s] */
     input_gate_t input[INPUT_COUNT];
-    score_t base; /* of CDKF_BASE_GAIN, with exponential forgetting */
-    agreement_t torque;
+    score_t base;       /* of CDKF_BASE_GAIN, with exponential forgetting */
+    agreement_t torque; /* measured with commanded [N m] */
+    float
+        other_torque; /* mean square of what the motor was not asked for, over the last seconds in which it was measured */
+    kinematics_t kinematics;
     change_detection_t change;
     whiteness_t whiteness;
     sticking_t sticking;
@@ -71,6 +83,7 @@ typedef struct evidence {
     hands_t hands;
     grip_force_t force;
     bool seen[SIGNAL_COUNT]; /* in this block */
+    bool paired;             /* the last sample measured both outputs */
     bool opened;             /* the last change was to another pilot */
 } evidence_t;
 
@@ -128,6 +141,9 @@ void evidence_add_torque(evidence_t *evidence, float commanded, float measured);
 
 /* Whether the torque may be other than the commanded one where it is not measured: somebody else was driving. */
 bool evidence_has_other_torque(const evidence_t *evidence);
+
+/* Outputs of a sample, and whether both are measured: [rad], [rad/s]. `period`: of samples [s]. */
+void evidence_add_outputs(evidence_t *evidence, const float y[CDKF_OUTPUTS], bool both, float elapsed, float period);
 
 /* After the update: nis / nis_size of the sample. */
 void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time);

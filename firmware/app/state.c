@@ -49,7 +49,7 @@ static const state_row_t rows[] = {
     MEMBERS(estimator.cdkf.acting, estimator.cdkf.acting, 4u, (uint32_t)CDKF_CONSIDERED),
     FLOATS(estimator.cdkf.trust, estimator.cdkf.points[MODEL_POINTS - 1].c[MODEL_COEFFICIENTS - 1]),
 
-    FLOATS(estimator.learning.evidence.ratio[0], estimator.learning.evidence.ratio[EVIDENCE_FORCE]),
+    FLOATS(estimator.learning.evidence.ratio[0], estimator.learning.evidence.ratio[EVIDENCE_KINEMATICS]),
     MEMBERS(estimator.learning.evidence.present, estimator.learning.evidence.present, 4u, EVERY_EVIDENCE),
     WORDS(estimator.learning.evidence.faults, estimator.learning.evidence.faults),
     FLOATS(estimator.learning.evidence.since_change, estimator.learning.evidence.hands.elapsed),
@@ -360,9 +360,11 @@ static bool is_consistent(const lever_t *lever)
     for (uint32_t i = 0u; i < (uint32_t)GROUPS; i++) {
         finite = finite && are_finite(group[i], count[i]);
     }
-    const bool squares = (estimate.nis >= 0.0f) && (lever->estimator.learning.evidence.motion.slow >= 0.0f);
-    const snapshot_t *kept = lever->estimator.learning.kept;
-    return finite && squares && is_belief(&lever->estimator.cdkf) && is_drawn(&lever->estimator) &&
+    const learning_t *learning = &lever->estimator.learning;
+    const bool positive =
+        (estimate.nis >= 0.0f) && (learning->evidence.motion.slow >= 0.0f) && (learning->elapsed >= 0.0f);
+    const snapshot_t *kept = learning->kept;
+    return finite && positive && is_belief(&lever->estimator.cdkf) && is_drawn(&lever->estimator) &&
            is_moderate(&lever->estimator.cdkf) && can_return(&lever->estimator, &kept[0]) &&
            can_return(&lever->estimator, &kept[1]);
 }

@@ -38,7 +38,7 @@ def rows(name: str) -> Iterator[list[str]]:
 def cell(text: str) -> str:
     """Return a cell of a .def file in words."""
     words = re.sub(r"ON\(EVIDENCE_(\w+)\)", r"\1", text)
-    words = re.sub(r"^(EVIDENCE|VERDICT|LEVER_FAULT)_", "", words).replace(" |", ",")
+    words = re.sub(r"\b(EVIDENCE|VERDICT|LEVER_FAULT)_", "", words).replace(" |", ",")
     number = re.fullmatch(r"(-?[\d.]+)f", words)
     return {"NOTHING": "", "NEVER": "", "0": "", "0u": "", "1": "yes", "ALWAYS": "yes"}.get(
         words, f"{float(number[1]):g}" if number else words.lower()

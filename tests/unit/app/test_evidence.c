@@ -5,6 +5,7 @@
 #include "random.h"
 #include "test.h"
 
+#include <math.h>
 #include <string.h>
 
 enum { SAMPLES = 20 }; /* in a block */
@@ -248,6 +249,94 @@ TEST(the_verdict_on_the_base_has_hysteresis)
     }
 }
 
+/* A lever that swings at 3 Hz, as its two sensors see it. */
+typedef struct swing {
+    double amplitude; /* [rad] */
+    double gain;      /* of the angle */
+    double rate_gain;
+    double offset; /* of the rate [rad/s] */
+    double late;   /* by which the rate is later than the angle [s] */
+    double noise;  /* of the angle [rad] */
+    double jump;   /* of the angle at half of the time [rad] */
+    bool alone;    /* the rate is measured only each other sample */
+} swing_t;
+
+/* Two seconds of it. Returns after how many blocks angle and rate did not agree, 0: they did all the time. */
+static uint32_t apart_after(swing_t swing)
+{
+    const double omega = 6.283185307 * 3.0;
+    uint32_t after = 0u;
+    for (uint32_t block = 1u; block <= 100u; block++) {
+        for (uint32_t k = 0u; k < (uint32_t)SAMPLES; k++) {
+            const double time = 1.0e-3 * (double)((20u * block) + k);
+            const double rest = 0.35 + ((block > 50u) ? swing.jump : 0.0);
+            const double angle = rest + (swing.gain * swing.amplitude * sin(omega * time));
+            const double rate = swing.rate_gain * swing.amplitude * omega * cos(omega * (time - swing.late));
+            const float y[] = {(float)(angle + (swing.noise * random_normal(&source))), (float)(rate + swing.offset)};
+            evidence_add_outputs(&evidence, y, !swing.alone || ((k % 2u) == 0u), PERIOD, PERIOD);
+        }
+        const bool before = evidence_has(&evidence, EVIDENCE_KINEMATICS);
+        end_block();
+        if (evidence_has(&evidence, EVIDENCE_KINEMATICS) && !before && (after == 0u)) {
+            after = block;
+        }
+    }
+    return after;
+}
+
+static const swing_t agreeing = {.amplitude = 0.01, .gain = 1.0, .rate_gain = 1.0, .noise = 5.0e-4};
+
+/* R33 */
+TEST(an_angle_that_is_not_the_integral_of_the_rate_is_found_within_0_6_s)
+{
+    static const double gains[][2] = {
+        {1.3, 1.0}, {0.7, 1.0}, {0.0, 1.0}, {2.0, 1.0}, {1.0, -1.0}, {1.0, 0.5}, {1.0, 1.5}};
+    for (uint32_t i = 0u; i < (sizeof gains / sizeof gains[0]); i++) {
+        setUp();
+        swing_t swing = agreeing;
+        TEST_ASSERT_EQUAL_UINT32(0u, apart_after(swing));
+        swing.gain = gains[i][0];
+        swing.rate_gain = gains[i][1];
+        const uint32_t after = apart_after(swing);
+        TEST_ASSERT_TRUE((after >= 1u) && (after <= 30u));
+        evidence_show(&evidence);
+        TEST_ASSERT_EQUAL_HEX32(LEVER_FAULT_THETA | LEVER_FAULT_THETA_DOT, evidence.faults);
+        (void)apart_after(agreeing);
+        TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_KINEMATICS));
+    }
+}
+
+/* Offsets, delays, noise and jumps of the one or the other, a gain within 8 %, and what was not measured together, say
+ * nothing of the gain; nor does too little motion. */
+TEST(what_is_no_gain_of_angle_or_rate_is_not_taken_for_one)
+{
+    static const swing_t swings[] = {{0.01, 1.0, 1.0, 0.05, 0.0, 5.0e-4, 0.0, false},
+        {0.01, 1.0, 1.0, 0.0, 0.01, 5.0e-4, 0.0, false}, {0.01, 1.0, 1.0, 0.0, 0.0, 1.0e-2, 0.0, false},
+        {0.01, 1.0, 1.0, 0.0, 0.0, 5.0e-4, 0.1, false}, {0.01, 1.08, 1.0, 0.0, 0.0, 5.0e-4, 0.0, false},
+        {0.01, 0.92, 1.0, 0.0, 0.0, 5.0e-4, 0.0, false}, {0.01, 2.0, 1.0, 0.0, 0.0, 0.0, 0.0, true}};
+    for (uint32_t i = 0u; i < (sizeof swings / sizeof swings[0]); i++) {
+        setUp();
+        TEST_ASSERT_EQUAL_UINT32(0u, apart_after(agreeing));
+        TEST_ASSERT_EQUAL_UINT32(0u, apart_after(swings[i]));
+    }
+    setUp();
+    TEST_ASSERT_EQUAL_UINT32(0u, apart_after((swing_t){.amplitude = 0.001, .gain = 2.0, .rate_gain = 1.0}));
+}
+
+/* And it says nothing of the base while it is there, nor ends without motion. */
+TEST(angle_and_rate_that_do_not_agree_say_nothing_of_the_base)
+{
+    swing_t swing = agreeing;
+    swing.gain = 2.0;
+    (void)apart_after(swing);
+    evidence.base = (score_t){-100.0f, 100.0f};
+    end_block();
+    TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_BASE));
+    swing.amplitude = 0.0;
+    (void)apart_after(swing);
+    TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_KINEMATICS));
+}
+
 /* Two seconds of samples of 1 ms in blocks of 20: asked is a sine of 3 Hz, measured a gain times that and a sine of 4 Hz.
  * Returns after how many blocks it was wrong, 0: never. */
 static uint32_t torque_wrong_after(double amplitude, double gain, double other)
@@ -358,7 +447,7 @@ TEST(the_verdict_on_the_torque_waits_until_enough_is_asked)
         const float product = row[i].gain * row[i].asked;
         setUp();
         config.settings.sample_period = row[i].sample_period;
-        evidence.torque = (agreement_t){row[i].asked, row[i].gain * product, product, 0.0f};
+        evidence.torque = (agreement_t){row[i].asked, row[i].gain * product, product};
         evidence_note(&evidence, EVIDENCE_MOTOR, row[i].before);
         end_block();
         TEST_ASSERT_EQUAL(row[i].is, evidence_has(&evidence, EVIDENCE_MOTOR));

@@ -229,15 +229,16 @@ TEST(a_float_that_is_not_finite_is_refused)
 }
 
 /* R53 */
-TEST(a_covariance_that_is_none_a_negative_square_and_points_that_are_not_of_the_belief_are_refused)
+TEST(a_covariance_that_is_none_a_negative_square_or_time_and_points_that_are_not_of_the_belief_are_refused)
 {
     start_bus();
     fly(50u);
     lever_t *other = lever_init(&other_memory, &config);
     cdkf_t *cdkf = &lever->estimator.cdkf;
     float *const member[] = {&cdkf->s[0], &cdkf->s_xx[0], &cdkf->s_xx[3], &cdkf->w[1], &cdkf->walk[2],
-        &lever->estimator.nis, &lever->estimator.learning.evidence.motion.slow, &cdkf->p[0], &cdkf->points[0].c[0]};
-    static const float value[] = {-1.0f, -1.0f, 0.0f, 1.0e6f, -1.0f, -1.0f, -1.0f, 1.0e3f, 1.0e3f};
+        &lever->estimator.nis, &lever->estimator.learning.evidence.motion.slow, &lever->estimator.learning.elapsed,
+        &cdkf->p[0], &cdkf->points[0].c[0]};
+    static const float value[] = {-1.0f, -1.0f, 0.0f, 1.0e6f, -1.0f, -1.0f, -1.0f, -1.0f, 1.0e3f, 1.0e3f};
     for (uint32_t i = 0u; i < (uint32_t)(sizeof value / sizeof value[0]); i++) {
         const float kept = *member[i];
         *member[i] = value[i];
