@@ -23,10 +23,10 @@
  *                                                   while (lever_next_frame(lever, &tx)) { transmit(&tx); }
  *
  * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent. Cost.
- * Every call is bounded; lever_update() is the expensive one: 2,710 instructions and 4,240 cycles on a Cortex-M4F on
- * average (lever model, as shipped), 7,930 instructions when the parameters learn (once a learn_period), 18,300 at the
- * first sample after a gap; with an aircraft and a mitigation 3,790 on average, and 19,200 at a sample with a margin
- * (25 a second). 40 KiB of code, 2.28 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
+ * Every call is bounded; lever_update() is the expensive one: 2,770 instructions and 4,320 cycles on a Cortex-M4F on
+ * average (lever model, as shipped), 8,080 instructions when the parameters learn (once a learn_period), 18,400 at the
+ * first sample after a gap; with an aircraft and a mitigation 3,850 on average, and 19,300 at a sample with a margin
+ * (25 a second). 40 KiB of code, 2.32 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
  * Numbers. Results are bit-identical on every IEEE 754 machine when built with this project's flags.
  */
 #ifndef LEVER_CDKF_H
@@ -335,6 +335,9 @@ void lever_test_ratios(const lever_t *lever, float ratio[LEVER_TEST_RATIOS]);
 const char *lever_parameter_name(uint8_t model, uint32_t index);
 const char *lever_parameter_unit(uint8_t model, uint32_t index);
 
+/* Name of a statistic that is watched ("BASE_STUCK"); NULL for an index that does not exist. */
+const char *lever_test_ratio_name(uint32_t index);
+
 /* --- health ---------------------------------------------------------------------------------------------------- */
 
 /* Conditions present at the last sample; none of them stops the estimator. HEALTH has those since the last HEALTH. */
@@ -513,7 +516,7 @@ typedef struct lever_recorder {
     uint32_t crc;        /* of what was sent of it */
 } lever_recorder_t;
 
-/* `period_us` of sample time from one snapshot to the next, some 340 frames each (on 1 Mbit/s classic CAN 4 % of the
+/* `period_us` of sample time from one snapshot to the next, some 350 frames each (on 1 Mbit/s classic CAN 4 % of the
  * bus at a second, 8 % at half a second). */
 void lever_recorder_init(lever_recorder_t *recorder, uint32_t period_us);
 

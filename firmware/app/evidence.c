@@ -5,6 +5,7 @@
 #include "math/share.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 #define NIS_TIME 0.1f          /* of nis_fast, and of motion.fast [s] */
@@ -48,6 +49,12 @@ static const evidence_row_t rows[EVIDENCE_COUNT] = {
 #include "app/evidence.def"
 };
 
+/* Without "EVIDENCE_". */
+static const char *const names[EVIDENCE_COUNT] = {
+#define EVIDENCE(name, threshold, off, fault, meaning) &#name[9],
+#include "app/evidence.def"
+};
+
 /* The evidence that shows as a fault. */
 static const uint32_t shown = 0u
 #define EVIDENCE(name, threshold, off, fault, meaning)                                                                 \
@@ -57,6 +64,11 @@ static const uint32_t shown = 0u
 
 /* Square of a change from sample to sample that does no harm, by input [m^2/s^4], [N^2 m^2]. */
 static const float harmless[INPUT_COUNT] = {4.0f, 0.09f};
+
+const char *lever_test_ratio_name(uint32_t index)
+{
+    return (index < (uint32_t)LEVER_TEST_RATIOS) ? names[index] : NULL;
+}
 
 void evidence_start(evidence_t *evidence)
 {

@@ -44,8 +44,9 @@ void lever_recorder_step(lever_recorder_t *recorder, const lever_t *lever)
 static void add_data(lever_recorder_t *recorder, message_snapshot_t *message)
 {
     const uint32_t begin = ((uint32_t)recorder->sent - 1u) * FRAME_DATA;
+    const uint32_t bytes = lesser_count((uint32_t)LEVER_STATE_BYTES - begin, FRAME_DATA);
     uint64_t data = 0u;
-    for (uint32_t i = 0u; (i < FRAME_DATA) && ((begin + i) < (uint32_t)LEVER_STATE_BYTES); i++) {
+    for (uint32_t i = 0u; i < bytes; i++) {
         const uint8_t byte = recorder->state[begin + i];
         recorder->crc = crc32_shift(recorder->crc ^ byte, 8u);
         const uint32_t place = 8u * i;

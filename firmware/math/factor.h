@@ -16,12 +16,11 @@
 
 enum { FACTOR_ROWS_MOST = 8 }; /* of factor_add_noise */
 
-/* Whether it is lower-triangular, with no negative diagonal element. */
+/* Whether it is lower-triangular. */
 static inline bool factor_is_lower(const float *s, uint32_t n)
 {
     bool lower = true;
     for (uint32_t i = 0u; i < n; i++) {
-        lower = lower && !(s[(i * n) + i] < 0.0f);
         for (uint32_t j = i + 1u; j < n; j++) {
             lower = lower && !(fabsf(s[(i * n) + j]) > 0.0f);
         }

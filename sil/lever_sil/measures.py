@@ -10,9 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from lever_cdkf.firmware.estimator import DO_NOT_TRUST
 from lever_cdkf.numeric.arrays import Array, BoolArray
-from lever_cdkf.report.series import runs
+from lever_cdkf.numeric.stretches import runs
 from numpy.typing import NDArray
 
 WRONG = 3.0
@@ -47,8 +46,8 @@ def settling_times(errors: Array, elapsed: Array, within: float = 0.05) -> Array
     return times
 
 
-def is_flagged(faults: NDArray[Any], mask: int = DO_NOT_TRUST) -> BoolArray:
-    """Return where the firmware shows any of these faults, by default those that say not to trust the estimates."""
+def is_flagged(faults: NDArray[Any], mask: int) -> BoolArray:
+    """Return where the firmware shows any of these faults; DO_NOT_TRUST has those that forbid to trust estimates."""
     shown: BoolArray = (faults.astype(np.int64) & mask) != 0
     return shown
 

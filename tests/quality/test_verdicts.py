@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 from lever_cdkf.can import codec
+from lever_cdkf.firmware.estimator import TEST_RATIOS
 from quality import tools
 
 APP = tools.FIRMWARE / "app"
@@ -38,6 +39,7 @@ def rows(name: str) -> Iterator[list[str]]:
 def cell(text: str) -> str:
     """Return a cell of a .def file in words."""
     words = re.sub(r"ON\(EVIDENCE_(\w+)\)", r"\1", text)
+    words = words.replace("(uint32_t)", "")
     words = re.sub(r"\b(EVIDENCE|VERDICT|LEVER_FAULT)_", "", words).replace(" |", ",")
     number = re.fullmatch(r"(-?[\d.]+)f", words)
     return {"NOTHING": "", "NEVER": "", "0": "", "0u": "", "1": "yes", "ALWAYS": "yes"}.get(
@@ -58,5 +60,5 @@ def test_the_readme_prints_the_table(name: str) -> None:
 def test_the_contract_has_the_same_names() -> None:
     """Of the evidence only what has a statistic."""
     statistics = [first for first, *_, meaning in rows("evidence") if not meaning.startswith("state")]
-    assert list(codec.choices("TEST_RATIO", "evidence").values()) == statistics
+    assert list(codec.choices("TEST_RATIO", "evidence").values()) == statistics == list(TEST_RATIOS)
     assert list(codec.choices("TEST_RATIO", "verdict").values()) == [first for first, *_ in rows("verdict")]

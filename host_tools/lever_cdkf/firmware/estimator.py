@@ -23,6 +23,11 @@ DO_NOT_TRUST: int = lib.LEVER_FAULTS_DO_NOT_TRUST
 FEEDTHROUGH_FREQUENCIES = tuple(range(2, 9))
 """What FEEDTHROUGH is sent for on the bus, one after the other [Hz]."""
 
+TEST_RATIOS = tuple(
+    ffi.string(lib.lever_test_ratio_name(index)).decode().lower() for index in range(lib.LEVER_TEST_RATIOS)
+)
+"""The statistics that are watched for faults and changes: "base_stuck"."""
+
 _SAMPLE_VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
 """What a sample may hold besides its time, each with a flag: lever_sample_t."""
 
@@ -199,11 +204,9 @@ class Estimator:
     def test_ratios(self) -> dict[str, float]:
         """Return each statistic that is watched for faults and changes, over its threshold [1]: above 1 it is
         evidence."""
-        from ..can import codec  # which takes 0.1 s
-
         ratios = ffi.new("float[]", lib.LEVER_TEST_RATIOS)
         lib.lever_test_ratios(self.pointer, ratios)
-        return dict(zip(codec.choices("TEST_RATIO", "evidence").values(), ratios, strict=True))
+        return dict(zip(TEST_RATIOS, ratios, strict=True))
 
     def watch(self, aircraft: AircraftResponse | None) -> None:
         """Watch the loop with this aircraft from now on; None: with none. Raise LeverError."""

@@ -66,12 +66,6 @@ def jumps(time: Array, columns: list[Array], relative: float = 0.02, apart: floa
     return moments
 
 
-def runs(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Return first and last index of every stretch in which `active` is true."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], active, [False])).astype(np.int8)))
-    return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
-
-
 class Welch:
     """One-sided power spectral density [unit²/Hz] of samples as they come: the mean over half-overlapping Hann windows.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..firmware.library import lib
+from ..firmware.estimator import TEST_RATIOS
 from ..numeric.arrays import FloatArray
 from .in_turn import InTurn
 
@@ -17,20 +17,13 @@ TEST_RATIO = (
 )
 
 
-def evidence_names() -> dict[int, str]:
-    """Return the statistics by number: "base_stuck"."""
-    from ..can import codec  # which takes 0.1 s
-
-    return codec.choices("TEST_RATIO", "evidence")
-
-
 class TestRatios(InTurn):
     """Kept of samples as they come."""
 
     __test__ = False  # no class of tests, for pytest
 
     def __init__(self) -> None:
-        super().__init__(["evidence", "test_ratio"], np.arange(int(lib.LEVER_TEST_RATIOS), dtype=np.float64))
+        super().__init__(["evidence", "test_ratio"], np.arange(float(len(TEST_RATIOS))))
 
     def at(self, time: FloatArray) -> FloatArray:
         """Return (times, statistics), as last sent before each time [s]; NaN before the first."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.firmware.native import Config, run_samples
+from lever_cdkf.firmware.native import DO_NOT_TRUST, Config, run_samples
 from lever_cdkf.numeric.arrays import Array
 
 from ..measures import covariance_of, is_flagged
@@ -88,7 +88,7 @@ class Firmware(Entrant):
 
     def _run(self, flight: Flight) -> Columns:
         columns = flight.firmware if self.flies_in(flight.scenario) else self._replayed(flight)
-        return columns | {"flagged": is_flagged(columns["faults"]).astype(np.float64)}
+        return columns | {"flagged": is_flagged(columns["faults"], DO_NOT_TRUST).astype(np.float64)}
 
     def flies_in(self, scenario: Scenario) -> bool:
         return scenario.config.choices["estimator"] == self.name

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from lever_cdkf.firmware.estimator import DO_NOT_TRUST
 from lever_cdkf.firmware.library import enum_names, lib
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 
@@ -125,7 +126,8 @@ def is_flagged(record: Record) -> BoolArray:
     health = record.health
     taken = np.diff(health["samples"].astype(np.int64), prepend=0) != 0
     since = np.arange(len(taken)) - np.maximum.accumulate(np.where(taken, np.arange(len(taken)), 0))
-    flagged: BoolArray = measures.is_flagged(health["faults"]) | ~is_estimating(record) | (since >= UNHEARD)
+    warned = measures.is_flagged(health["faults"], DO_NOT_TRUST)
+    flagged: BoolArray = warned | ~is_estimating(record) | (since >= UNHEARD)
     return flagged
 
 

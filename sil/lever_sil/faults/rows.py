@@ -386,27 +386,34 @@ def _table() -> Iterator[Row]:
 ROWS = {row.name: row for row in _table()}
 """All by name, in the order of the table."""
 
-_TWO_RATES = "angle and rate are not compared with each other, for which there is no room; another arm fits both"
+_DRIFT = "angle and rate are compared; a gain that drifts slowly is found when it is off by an eighth"
 _OFFSET = "a step passes the high-passes; for some pilots it is taken for a change of the arm"
 _TORQUE = "takes a second: a shorter memory takes other torque of a frequency near the dither's for a wrong gain"
 _BASE = "without torque a gain of z̈ is a scale of the arm, which no innovation tells from it; dither tells in seconds"
-_LEVELS = "its levels are off by the whole angle when it is right again: BASE and INNOVATION go after up to 2.4 s"
+_LEVELS = "its levels are off by the whole angle when it is right again: BASE and INNOVATION go after up to 3.6 s"
 _RATE_ALONE = "learnt from the rate alone, some pilots' arm is off by over 3 sigma for 2 s after the angle is back"
-_CLOCK = "it is samples at another rate, which is no fault: the firmware has no clock of its own"
+_CLOCK = "the firmware has no clock of its own; a rate that is off by less than an eighth is that of another arm"
+_TRIM = "f_n is that at the angle shown, which is off, and k_p that is held does not make up for it"
 KNOWN: dict[str, str] = {
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",
-    "theta_gain_drift": _TWO_RATES,
-    "theta_zero_frozen": _LEVELS,
-    "theta_sign_frozen": _LEVELS,
+    "theta_zero": _LEVELS,
+    "theta_sign": _LEVELS,
+    "theta_gain_half": _LEVELS,
+    "theta_gain_double": _LEVELS,
+    "theta_gain_drift": _DRIFT,
+    "theta_step": _OFFSET,
+    "theta_drift": _OFFSET,
     "theta_invalid_from_power_on": _RATE_ALONE,
     "theta_saturated_from_power_on": _RATE_ALONE,
-    "theta_drift_frozen": "f_n is that at the angle shown, which is off, and k_p that is held does not make up for it",
+    "theta_step_frozen": _TRIM,
+    "theta_drift_frozen": _TRIM,
     "theta_dot_step": _OFFSET,
-    "theta_dot_gain_half": _TWO_RATES,
-    "theta_dot_gain_double": _TWO_RATES,
+    "theta_dot_gain_double": _LEVELS,
     "tau_m_stuck": _TORQUE,
     "tau_m_zero": _TORQUE,
     "z_ddot_step": _OFFSET,
+    "z_ddot_drift": _OFFSET,
+    "z_ddot_sign": "what was learnt in the second before BASE shows may be kept, and BASE with it",
     "z_ddot_sign_from_power_on": "an arm is learnt that fits it, until BASE shows it after 2.3 to 2.8 s",
     "z_ddot_gain_half": _BASE,
     "z_ddot_gain_double": _BASE,

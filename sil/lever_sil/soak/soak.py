@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 from lever_cdkf.firmware.config import Config
-from lever_cdkf.firmware.estimator import Estimator
+from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator
 from lever_cdkf.firmware.library import lib
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
-from lever_cdkf.report.series import runs
+from lever_cdkf.numeric.stretches import runs
 from numpy.typing import NDArray
 
 from .. import measures
@@ -181,7 +181,7 @@ def judge(scenario: Scenario, time: FloatArray, truth: Any, estimates: NDArray[A
     values = {**truth.parameters, **vars(truth.dynamics)}
     judged = judged_samples(scenario, time) & np.isfinite(values["natural_frequency"])
     running = (healths["mode"] == lib.LEVER_MODE_RUN) | (healths["mode"] == lib.LEVER_MODE_FROZEN)
-    unflagged = judged & running & ~measures.is_flagged(healths["faults"])
+    unflagged = judged & running & ~measures.is_flagged(healths["faults"], DO_NOT_TRUST)
     sums = Sums(looks=len(time), judged=int(judged.sum()), unflagged=int(unflagged.sum()))
     sums.in_fault = int(np.sum(healths["mode"] == lib.LEVER_MODE_FAULT))
     sums.not_finite = int(sum(np.sum(~np.isfinite(estimates[name])) for name in ("parameter", "parameter_sigma")))

@@ -17,10 +17,10 @@ import pytest
 from lever_cdkf.can import codec
 from lever_cdkf.cli.formats import FORMATS
 from lever_cdkf.cli.main import main
+from lever_cdkf.firmware.estimator import TEST_RATIOS
 from lever_cdkf.replay import engine, reduction
 from lever_cdkf.replay.outputs import FILES
 from lever_cdkf.replay.summary import verdict
-from lever_cdkf.results.ratios import evidence_names
 from lever_cdkf.results.summary import ReplaySummary, of
 from python.conftest import Refused, Session, simulated
 from python.report.reading import figures, first_number, read, unpack
@@ -106,7 +106,7 @@ def test_test_ratios_are_those_of_the_simulation(tmp_path: Path) -> None:
     simulation, again = (columns(folder / "trace.csv") for folder in (session.folder, tmp_path / "out"))
     for name in ("evidence", "test_ratio", "verdict"):
         assert again[name] == simulation[name], name
-    assert set(simulation["evidence"]) - {""} == {str(number) for number in evidence_names()}
+    assert set(simulation["evidence"]) - {""} == {str(number) for number in range(len(TEST_RATIOS))}
     for folder in (session.folder, tmp_path / "out"):
         assert "figure-test-ratios" in (folder / "report.html").read_text(encoding="utf-8")
 

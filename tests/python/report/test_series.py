@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from lever_cdkf.numeric.stretches import runs
 from lever_cdkf.report import series
 from lever_cdkf.report.bode import FREQUENCIES, slow_trim, transfer
 from oracle import Lever
@@ -97,5 +98,5 @@ def test_jumps_are_found_once_and_drift_is_none() -> None:
 
 
 def test_runs_are_first_and_last_index() -> None:
-    assert series.runs(np.array([True, True, False, True])) == [(0, 1), (3, 3)]
-    assert series.runs(np.zeros(3, dtype=bool)) == []
+    assert runs(np.array([True, True, False, True])) == [(0, 1), (3, 3)]
+    assert runs(np.zeros(3, dtype=bool)) == []

@@ -21,7 +21,7 @@ def test_rms_and_coverage() -> None:
 def test_what_is_flagged() -> None:
     change, base = lib.LEVER_FAULT_CHANGE, lib.LEVER_FAULT_BASE
     faults = np.array([0, change, base, base | change], dtype=np.uint32)
-    assert measures.is_flagged(faults).tolist() == [False, False, True, True]
+    assert measures.is_flagged(faults, DO_NOT_TRUST).tolist() == [False, False, True, True]
     assert measures.is_flagged(faults, change).tolist() == [False, True, False, True]
     assert DO_NOT_TRUST & base
 

@@ -497,6 +497,16 @@ TEST(a_change_has_to_explain_the_innovations_within_its_probation)
     }
 }
 
+/* Where noise is not estimated, nothing would end it. */
+TEST(noise_that_is_not_estimated_has_not_grown)
+{
+    config.settings.noise_window = 0.0f;
+    evidence.since_change = 0.1f;
+    evidence.nis_fast = 9.0f;
+    end_block();
+    TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_NOISE));
+}
+
 /* One is reported from the end of its probation for three seconds; learnt with noise as it was for the first. */
 TEST(a_change_passes_through_its_stages)
 {

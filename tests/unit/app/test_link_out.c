@@ -394,6 +394,9 @@ TEST(test_ratios_are_sent_in_turn)
     evidence->ratio[EVIDENCE_HANDS] = 100.0f;
     evidence->present = 1u << (uint32_t)EVIDENCE_HANDS;
     lever_test_ratios(lever, ratio);
+    TEST_ASSERT_EQUAL_STRING("MOTOR", lever_test_ratio_name(0u));
+    TEST_ASSERT_EQUAL_STRING("KINEMATICS", lever_test_ratio_name((uint32_t)LEVER_TEST_RATIOS - 1u));
+    TEST_ASSERT_NULL(lever_test_ratio_name((uint32_t)LEVER_TEST_RATIOS));
     TEST_ASSERT_EQUAL_FLOAT_ARRAY(evidence->ratio, ratio, LEVER_TEST_RATIOS);
     for (uint32_t i = 0u; i <= (uint32_t)LEVER_TEST_RATIOS; i++) {
         const uint8_t which = (uint8_t)(i % (uint32_t)LEVER_TEST_RATIOS);

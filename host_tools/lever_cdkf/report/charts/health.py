@@ -3,11 +3,12 @@
 import numpy as np
 
 from ...firmware import native
+from ...firmware.estimator import TEST_RATIOS
 from ...numeric.arrays import Array
-from ...results.ratios import evidence_names
+from ...numeric.stretches import runs
 from ..figure import Figure, Spec, axis, hover, line, time_axis
 from ..run import Run
-from ..series import runs, spread_indices
+from ..series import spread_indices
 
 COUNTS = ("lost", "corrupt", "late")
 LANE_POINTS = 1500  # how finely the bars are drawn
@@ -53,7 +54,7 @@ def test_ratios(run: Run) -> Figure | None:
         return None
     top = min(max(1.5, 1.1 * float(np.nanmax(ratios))), RATIO_MOST)
     figure = Figure([axis("test ratio [1]", range=[0.0, top])], time_axis(run.end), 360)
-    for index, name in enumerate(evidence_names().values()):
+    for index, name in enumerate(TEST_RATIOS):
         words = name.replace("_", " ")
         colour, dash = RATIO_COLOURS[index % len(RATIO_COLOURS)], RATIO_DASHES[index // len(RATIO_COLOURS)]
         figure.add(line(time, ratios[:, index], words, colour, line_width=1.4, line_dash=dash) | hover(words))
