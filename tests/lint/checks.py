@@ -74,25 +74,12 @@ def misra(*files: str | Path, without: AbstractSet[str] = frozenset()) -> str:
     suppressed on the line where it is, with its number. cppcheck's exit status says nothing reliable, so its output is
     read.
     """
-    options = (
-        "-ULEVER_ASSERTIONS",
-        "--addon=misra",
-        "--std=c99",
-        "--quiet",
-        "--inline-suppr",
-        "--enable=style,warning,information",
-    )
+    options = ("--addon=misra", "--std=c99", "--quiet", "--inline-suppr", "--enable=style,warning,information")
+    without_assertions = "-ULEVER_ASSERTIONS"
     template = "--template={file}:{line}: {severity} {id}"
     with tempfile.TemporaryDirectory() as scratch:  # otherwise its dumps are written beside the sources
-        _, output = _run(
-            "cppcheck",
-            *options,
-            f"--cppcheck-build-dir={scratch}",
-            template,
-            "-I",
-            FIRMWARE,
-            *files,
-        )
+        places = (f"--cppcheck-build-dir={scratch}", "-I", FIRMWARE)
+        _, output = _run("cppcheck", *options, without_assertions, template, *places, *files)
     found = [match[0] for match in CPPCHECK_FINDING.finditer(output) if match["rule"] not in NOT_APPLIED | without]
     return "\n".join(["fix, or suppress as firmware/MISRA.md says:", *found, ""]) if found else ""
 

@@ -12,6 +12,7 @@ import pytest
 from lever_cdkf.can import codec
 from lever_cdkf.can.commander import KEEP, result_of
 from lever_cdkf.firmware.config import Config, model_parameters
+from lever_cdkf.firmware.estimator import TEST_RATIOS
 from lever_cdkf.firmware.library import enum_names, enum_words, ffi, lib
 from lever_cdkf.watch import status
 from lever_cdkf.watch.paired import Paired
@@ -62,6 +63,24 @@ def test_feedthrough_of_every_frequency_is_kept(make_flight: Callable[..., Fligh
         assert entry.phase_sigma == pytest.approx(phase_sigma, rel=0.01, abs=0.0012, nan_ok=True)
     picture.take([], 10.0)
     assert all(math.isnan(entry.gain_sigma) for entry in picture.feedthrough())
+
+
+def test_the_nearest_evidence_is_shown_where_it_is_sent(make_flight: Callable[..., Flight]) -> None:
+    picture = Picture()
+    flight = make_flight(Config(settings={"publish_period": 1e-3, "publish_test_ratios": 1.0}))
+    assert status.nearest_evidence(picture) is None
+    watch(picture, flight, 3.0)
+    said = flight.bus.estimator.test_ratios()
+    for index, ratio in picture.test_ratios().items():
+        assert ratio == pytest.approx(max(list(said.values())[index], 0.0), abs=0.1)
+    shown = picture.test_ratios()
+    first = sorted(shown, key=shown.__getitem__)[-1]
+    text = status.nearest_evidence(picture)
+    assert text is not None
+    assert text.startswith(f"{TEST_RATIOS[first].replace('_', ' ')} {shown[first]:.2f}, ")
+    assert text.count(",") == 2
+    picture.take([], 10.0)
+    assert status.nearest_evidence(picture) is None
 
 
 def test_coherence_is_that_of_the_samples_that_came() -> None:
