@@ -142,14 +142,14 @@ static bool encode_link_health(lever_t *lever, lever_frame_t *frame)
 /* One statistic after the other, each time the next. */
 static bool encode_test_ratio(lever_t *lever, lever_frame_t *frame)
 {
-    link_t *link = &lever->link;
     const learning_t *learning = &lever->estimator.learning;
-    const float ratio = learning->evidence.ratio[link->evidence];
+    const uint8_t which = (uint8_t)(lever->link.evidence % (uint32_t)LEVER_TEST_RATIOS);
+    const float ratio = learning->evidence.ratio[which];
     const message_test_ratio_t message = {.ratio = greater(lesser(ratio, MESSAGE_TEST_RATIO_MOST), 0.0f),
-        .evidence = link->evidence,
+        .evidence = which,
         .verdict = learning->verdict,
-        .present = evidence_has(&learning->evidence, (enum evidence_id)link->evidence)};
-    link->evidence = (uint8_t)((link->evidence + 1u) % (uint32_t)LEVER_TEST_RATIOS);
+        .present = evidence_has(&learning->evidence, (enum evidence_id)which)};
+    lever->link.evidence = (uint8_t)(which + 1u);
     return message_test_ratio_encode(frame, &message);
 }
 

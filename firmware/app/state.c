@@ -98,7 +98,7 @@ static const state_row_t rows[] = {
     MEMBERS(link.due, link.due, 2u, ((uint32_t)1u << (uint32_t)OUTPUTS) - 1u),
     BYTES(link.parts, link.parts, ANY_BYTE),
     BYTES(link.pages, link.pages, ((uint32_t)1u << (uint32_t)MESSAGE_PAGE_COUNT) - 1u),
-    BYTES(link.evidence, link.evidence, (uint32_t)LEVER_TEST_RATIOS - 1u),
+    BYTES(link.evidence, link.evidence, (uint32_t)LEVER_TEST_RATIOS),
     BYTES(link.frequency, link.command_counter, COUNTER),
     BYTES(link.command_result, link.command_result, (uint32_t)MESSAGE_RESULT_COUNT - 1u),
     BYTES(link.counter[0], link.counter[OUTPUT_STATE_ESTIMATE], COUNTER),

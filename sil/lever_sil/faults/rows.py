@@ -413,7 +413,7 @@ KNOWN: dict[str, str] = {
     "tau_m_zero": _TORQUE,
     "z_ddot_step": _OFFSET,
     "z_ddot_drift": _OFFSET,
-    "z_ddot_sign": "what was learnt in the second before BASE shows may be kept, and BASE with it",
+    "z_ddot_sign": "where the base moves the lever little, it is not seen to be right again, and BASE stays",
     "z_ddot_sign_from_power_on": "an arm is learnt that fits it, until BASE shows it after 2.3 to 2.8 s",
     "z_ddot_gain_half": _BASE,
     "z_ddot_gain_double": _BASE,
