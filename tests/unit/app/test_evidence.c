@@ -323,6 +323,16 @@ TEST(what_is_no_gain_of_angle_or_rate_is_not_taken_for_one)
     TEST_ASSERT_EQUAL_UINT32(0u, apart_after((swing_t){.amplitude = 0.001, .gain = 2.0, .rate_gain = 1.0}));
 }
 
+TEST(a_motion_of_a_milliradian_is_the_least_that_says_anything)
+{
+    static const double amplitudes[] = {0.0013, 0.0017}; /* 0.93 of it passes, over the root of two */
+    for (uint32_t i = 0u; i < 2u; i++) {
+        setUp();
+        const swing_t swing = {.amplitude = amplitudes[i], .gain = 2.0, .rate_gain = 1.0};
+        TEST_ASSERT_EQUAL(i == 1u, apart_after(swing) != 0u);
+    }
+}
+
 /* And it says nothing of the base while it is there, nor ends without motion. */
 TEST(angle_and_rate_that_do_not_agree_say_nothing_of_the_base)
 {
@@ -495,6 +505,26 @@ TEST(a_change_has_to_explain_the_innovations_within_its_probation)
         evidence_end_block(&evidence, &cdkf, &block);
         TEST_ASSERT_EQUAL(row[i].is, evidence_has(&evidence, EVIDENCE_NOISE));
     }
+}
+
+TEST(torque_of_somebody_else_is_more_than_the_noise_of_the_sensor)
+{
+    evidence.other_torque = 2.4e-3f;
+    TEST_ASSERT_FALSE(evidence_has_other_torque(&evidence));
+    evidence.other_torque = 2.6e-3f;
+    TEST_ASSERT_TRUE(evidence_has_other_torque(&evidence));
+}
+
+/* What was compared with parameters that were held begins anew. */
+TEST(parameters_that_learn_again_have_no_past)
+{
+    evidence.base = (score_t){-100.0f, 100.0f};
+    evidence_note(&evidence, EVIDENCE_BASE, true);
+    evidence.whiteness.time = 3.0f;
+    evidence_resume(&evidence);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, evidence.base.information);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, evidence.whiteness.time);
+    TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_BASE));
 }
 
 /* Where noise is not estimated, nothing would end it. */

@@ -100,3 +100,14 @@ TEST(the_impulse_without_hands_is_that_of_the_lever_alone)
     TEST_ASSERT_FLOAT_WITHIN(1.0e-7f, PERIOD * (1.5f - (lift * (2.0f + 9.80665f)) - (0.5f * 0.3f) - (5.0f * 0.3f)),
         hands_predict(&hands, &fixed, &step, x));
 }
+
+/* What a block has gathered is gone; what is known of the hands stays. */
+TEST(a_block_begins_with_nothing)
+{
+    hands = (hands_t){
+        .begin = 1.0f, .impulse = 2.0f, .drive = 3.0f, .elapsed = 4.0f, .change = 5.0f, .residual = 6.0f, .idle = true};
+    hands_begin(&hands);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, fabsf(hands.begin) + fabsf(hands.impulse) + fabsf(hands.drive) + hands.elapsed);
+    TEST_ASSERT_FALSE(hands.idle);
+    TEST_ASSERT_EQUAL_FLOAT(11.0f, hands.change + hands.residual);
+}

@@ -520,6 +520,18 @@ TEST(a_notch_is_one)
     TEST_ASSERT_TRUE(gain < 0.1);
 }
 
+/* Of an arm whose frequency is beyond what the step can follow: it moves by 0.8 of what comes in. */
+TEST(a_notch_is_stable_however_stiff_the_arm)
+{
+    static const model_dynamics_t stiff = {.stiffness = 4.0e6f, .damping = 6.3f, .forcing = -2.23f, .torque = 1.70f};
+    sample.mitigation = (uint8_t)LEVER_MITIGATION_NOTCH;
+    run(100u);
+    sample.dynamics = &stiff;
+    (void)memset(&mitigation.notch, 0, sizeof mitigation.notch);
+    run(1u);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-6f, 0.8f * sample.theta, mitigation.notch.band_pass);
+}
+
 TEST(one_correction_fades_before_the_other_begins)
 {
     run(3000u);
