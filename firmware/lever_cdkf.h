@@ -23,9 +23,9 @@
  *                                                   while (lever_next_frame(lever, &tx)) { transmit(&tx); }
  *
  * Threads. An instance belongs to one thread (or interrupt level) at a time; different instances are independent. Cost.
- * Every call is bounded; lever_update() is the expensive one: 2,770 instructions and 4,320 cycles on a Cortex-M4F on
- * average (lever model, as shipped), 8,080 instructions when the parameters learn (once a learn_period), 18,400 at the
- * first sample after a gap; with an aircraft and a mitigation 3,850 on average, and 19,300 at a sample with a margin
+ * Every call is bounded; lever_update() is the expensive one: 2,760 instructions and 4,300 cycles on a Cortex-M4F on
+ * average (lever model, as shipped), 8,060 instructions when the parameters learn (once a learn_period), 18,400 at the
+ * first sample after a gap; with an aircraft and a mitigation 3,830 on average, and 19,300 at a sample with a margin
  * (25 a second). 40 KiB of code, 2.32 KiB an instance, less than 1 KiB of stack (firmware/port/PORTING.md).
  * Numbers. Results are bit-identical on every IEEE 754 machine when built with this project's flags.
  */
@@ -254,7 +254,8 @@ void lever_feedthrough(const lever_t *lever, float frequency, lever_feedthrough_
 
 enum lever_aircraft_limits { LEVER_AIRCRAFT_POINTS = 24, LEVER_SEAT_MODES = 3 };
 
-/* (by_rate s + by_place) / (s^2 + damping s + stiffness): a bending mode of the cabin between accelerometer and seat. */
+/* (by_rate s + by_place) / (s^2 + damping s + stiffness): a bending mode of the cabin between the
+ * accelerometer and the seat. */
 typedef struct lever_seat_mode {
     float by_rate;   /* [1/s] */
     float by_place;  /* [1/s^2] */
@@ -262,9 +263,10 @@ typedef struct lever_seat_mode {
     float stiffness; /* above 0 [1/s^2] */
 } lever_seat_mode_t;
 
-/* How a helicopter answers to its collective lever: vertical acceleration at the pilot's seat over the lever's angle, up
- * and raised positive, with gearing, delays and actuator, at frequencies about those of bounce: 1.5 to 8 Hz. Where the
- * accelerometer is not at the seat and seat_modes is 0, the acceleration is that at the accelerometer. */
+/* How a helicopter answers to its collective lever: vertical acceleration at the pilot's seat over the lever's
+ * angle, up and raised positive, with gearing, delays and actuator, at frequencies about those of bounce: 1.5 to
+ * 8 Hz. Where the accelerometer is not at the seat and seat_modes is 0, the acceleration is that at the
+ * accelerometer. */
 typedef struct lever_aircraft {
     uint8_t count;                          /* frequencies, at least 3 */
     float frequency[LEVER_AIRCRAFT_POINTS]; /* rising [Hz] */
@@ -289,10 +291,9 @@ enum lever_bounce {
 /* How near the loop through arm, lever and rotor is to instability. */
 typedef struct lever_stability {
     uint8_t state; /* enum lever_bounce; UNKNOWN while it is not valid, but an ALARM stays */
-    bool
-        valid; /* as in STABILITY: a sample with an output came within 20 ms or three sample periods, by the clock of the
-                   samples or lever_idle(), the sample clock advances, and the margin is known. Else, the numbers are those
-                   known last */
+    /* As in STABILITY: a sample with an output came within 20 ms or three sample periods, by the clock of the samples
+     * or lever_idle(), the sample clock advances, and the margin is known. Else, the numbers are those known last. */
+    bool valid;
     float gain_margin; /* by which the loop may grow until it is unstable, at most 40 [dB] */
     float gain_margin_sigma;
     float modulus; /* least |1 - L| of the loop L, negative where it is unstable [1] */
@@ -316,17 +317,18 @@ typedef struct lever_correction {
     float weight; /* of the fade: 0 passive, 1 all of it */
 } lever_correction_t;
 
-/* After the last sample, or lever_idle(). It fades in within a second while a command was accepted within the last second,
- * as for torque, and is 0 within 100 ms after that has ended, or a sensor, the sample clock or the samples have failed;
- * whoever gets none for 100 ms takes 0. */
+/* After the last sample, or lever_idle(). It fades in within a second while a command was accepted within the last
+ * second, as for torque, and is 0 within 100 ms after that has ended, or a sensor, the sample clock or the samples
+ * have failed; whoever gets none for 100 ms takes 0. */
 void lever_correction(const lever_t *lever, lever_correction_t *correction);
 
 /* --- evidence --------------------------------------------------------------------------------------------------- */
 
 enum lever_evidence_limits { LEVER_TEST_RATIOS = 14 };
 
-/* What is watched for faults and changes: each statistic over its threshold, as at the end of the last learn_period. Above
- * 1 it is evidence, until it falls below a second threshold; firmware/app/evidence.def has the list, in this order. */
+/* The test ratio of each statistic that is watched for faults and changes: its value over its threshold, as at the end
+ * of the last learn_period. Above 1 it is evidence, until it falls below a second threshold. The order is that of
+ * firmware/app/evidence.def; lever_test_ratio_name() has the names. */
 void lever_test_ratios(const lever_t *lever, float ratio[LEVER_TEST_RATIOS]);
 
 /* --- names ------------------------------------------------------------------------------------------------------ */
@@ -366,8 +368,8 @@ enum lever_fault {
  * tables count an estimate as flagged by this mask; in HEALTH a fault of one sample stands for a publish_period.
  * In it: THETA, THETA_DOT, TORQUE, BASE: an input is missing, and the estimate not of now; or it is wrong, and may have
  * been learnt from. CLOCK: samples are ignored, or not of the time they state. INNOVATION, MISMATCH: the standard
- * deviations do not hold. CALIBRATION: an input is scaled wrongly, and the parameters with it. BOUND, RECOVERED: a value
- * is that of its bound, or the first guess. HANDS_OFF: there is no pilot whose parameters these could be.
+ * deviations do not hold. CALIBRATION: an input is scaled wrongly, and the parameters with it. BOUND, RECOVERED: a
+ * value is that of its bound, or the first guess. HANDS_OFF: there is no pilot whose parameters these could be.
  * Not in it: EXCITATION, SETTLING (the parameters stand, and their standard deviations hold), CHANGE (followed, with
  * standard deviations that grow), GAP, COMMUNICATION, PLATFORM, DUPLICATE (of the link and the machine). */
 enum lever_faults {
@@ -424,8 +426,8 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform);
  *   - a sample with a valid theta or theta_dot came within 20 ms or three sample periods, whichever is longer;
  *   - the sample clock advances;
  *   - a COMMAND, or lever_command(), was accepted within the last second of sample time: repeat one (keep-alive);
- *   - the platform reports none of ROM, SELF_TEST, WATCHDOG, HARD_FAULT, and the settings are as lever_init() found them:
- *     they are looked at each second, and a change raises LEVER_FAULT_PLATFORM for good;
+ *   - the platform reports none of ROM, SELF_TEST, WATCHDOG, HARD_FAULT, and the settings are as lever_init() found
+ *     them: they are looked at each second, and a change raises LEVER_FAULT_PLATFORM for good;
  *   - since LEVER_FAULT_HANDS_OFF, or a motor found to do other than it is asked (LEVER_FAULT_TORQUE, but not for a
  *     torque that is only missing), a command has asked for torque anew, with that fault gone: by a dither or a
  *     mitigation that it names, where the command before it named none.
@@ -486,10 +488,10 @@ uint16_t lever_state_layout(void);
 /* Between two samples, when lever_next_frame() has nothing left. */
 void lever_state_save(const lever_t *lever, uint8_t state[LEVER_STATE_BYTES]);
 
-/* From then on the instance is as that was which was saved: for a replay, on a desktop; a controller must not take its
- * state from a bus. Returns false, changing nothing, if a value is out of its range or not finite, the filter would break
- * its invariant, the settings are others, or one of the two has an aircraft and the other has none. Bytes that are
- * accepted may make any estimate, but a finite one. Needs another instance on the stack. */
+/* From then on the instance is as that was which was saved: for a replay, on a desktop; a controller must not take
+ * its state from a bus. Returns false, changing nothing, if a value is out of its range or not finite, the filter
+ * would break its invariant, the settings are others, or one of the two has an aircraft and the other has none.
+ * Bytes that are accepted may make any estimate, but a finite one. Needs another instance on the stack. */
 bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES]);
 
 /* Sends SNAPSHOT beside the estimates: each period the state after a sample, spread over the time until the next, and

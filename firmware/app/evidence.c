@@ -49,7 +49,7 @@ static const evidence_row_t rows[EVIDENCE_COUNT] = {
 #include "app/evidence.def"
 };
 
-/* Without "EVIDENCE_". */
+/* The names without "EVIDENCE_". */
 static const char *const names[EVIDENCE_COUNT] = {
 #define EVIDENCE(name, threshold, off, fault, meaning) &#name[9],
 #include "app/evidence.def"
@@ -233,8 +233,8 @@ static void judge_motor(evidence_t *evidence, float period, float sample_period)
     agreement_forget(&evidence->torque, 1.0f - share_of(period, AGREEMENT_MEMORY));
 }
 
-/* Angle against the integral of the rate. The gain's standard deviation is what else differs over the root of the number of
- * blocks: the effective one of their weights (Kish 1965), as a few large ones may be most of the sum. */
+/* Compares the angle with the integral of the rate. The gain's standard deviation is what else differs, over the root
+ * of the effective number of blocks (Kish 1965), as a few large ones may be most of the sum. */
 static void judge_kinematics(evidence_t *evidence, float period)
 {
     kinematics_t *of = &evidence->kinematics;
@@ -253,8 +253,8 @@ static void judge_kinematics(evidence_t *evidence, float period)
     agreement_forget(&of->agreement, keep);
 }
 
-/* A change of an arm that was known has to explain the innovations within its probation; otherwise noise has grown, where
- * that is estimated: without an estimate nothing would end it. */
+/* A change of an arm that was known has to explain the innovations within its probation; otherwise noise has grown,
+ * where that is estimated: without an estimate nothing would end it. */
 static void judge_noise(evidence_t *evidence, const evidence_block_t *block)
 {
     const float since = evidence->since_change;

@@ -1,12 +1,12 @@
-/* What the samples say of sensors, pilot and model: statistics with their thresholds (evidence.def). Nothing here changes
- * the filter; what follows from the evidence is the verdict's (verdict.h).
+/* What the samples say of sensors, pilot and model: statistics with their thresholds (evidence.def). Nothing here
+ * changes the filter; what follows from the evidence is the verdict's (verdict.h).
  *
  *   stuck    a signal has not changed by a bit for a while, and the innovations say that it should have. For the base
  *            acceleration, which innovations tell late, it is enough that it did change all the time before
  *   base     the response to the base acceleration is not about once what it should be: no sensor, the wrong sign, the
  *            wrong unit. By the score of a sudden error of the accelerometer's gain (filter/cdkf.h)
  *   motor    the measured torque does not follow the commanded one. By regression; other torque makes it less sure
- *   kinematics  the angle is not the integral of the rate, whatever the arm. Likewise
+ *   kinematics  the angle is not the integral of the rate, whatever the arm. By the same regression
  *   motion   the mean square of the measured rate without the noise of its sensor
  */
 #ifndef APP_EVIDENCE_H
@@ -36,14 +36,14 @@ typedef struct stillness {
     float still;  /* time for which it has been that [s] */
 } stillness_t;
 
-/* Of a signal with what it should be: sums of squares and products, with exponential forgetting [unit^2]. */
+/* Compares a signal with what it should be: sums of squares and products, with exponential forgetting [unit^2]. */
 typedef struct agreement {
     float expected;
     float measured;
     float product;
 } agreement_t;
 
-/* Angle, and rate integrated, through the same high-pass of second order [rad]: of an offset of either nothing is left. */
+/* The angle and the integrated rate [rad], through the same second-order high-pass: offsets of either do not pass. */
 typedef struct kinematics {
     float passed[2];          /* the first order of the angle, of the integral, */
     float level[2];           /* and the level of that */
@@ -73,8 +73,7 @@ typedef struct evidence {
     input_gate_t input[INPUT_COUNT];
     score_t base;       /* of CDKF_BASE_GAIN, with exponential forgetting */
     agreement_t torque; /* measured with commanded [N m] */
-    float
-        other_torque; /* mean square of what the motor was not asked for, over the last seconds in which it was measured */
+    float other_torque; /* mean square of what the motor was not asked for, while it was measured [N^2 m^2] */
     kinematics_t kinematics;
     change_detection_t change;
     whiteness_t whiteness;
@@ -132,7 +131,7 @@ static inline bool evidence_repeats(const evidence_t *evidence, enum signal sign
     return !((value < last) || (value > last));
 }
 
-/* Output y, which is not valid where it is refused. Innovations are now `level` times as large as expected, in squares. */
+/* Output y, which is not valid where it is refused. The squares of innovations are now `level` times those expected. */
 bool evidence_refuses_output(evidence_t *evidence, const cdkf_t *cdkf, uint32_t i, float y, float level, float elapsed);
 
 /* A measured torque and the one that was commanded before it [N m]; one sample in EVIDENCE_TORQUE_EVERY is enough. */
@@ -148,9 +147,9 @@ void evidence_add_outputs(evidence_t *evidence, const float y[CDKF_OUTPUTS], boo
 /* After the update: nis / nis_size of the sample. */
 void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time);
 
-/* The measured rate, or what is presumed of it [rad/s], by output i. As the product of successive samples: unlike motion,
- * the noise of a sensor differs from sample to sample. The prediction is no evidence of motion: the base drives it on a
- * lever that is locked. */
+/* The measured rate, or what is presumed of it [rad/s], by output i. As the product of successive samples: unlike
+ * motion, the noise of a sensor differs from sample to sample. The prediction is no evidence of motion: the base drives
+ * it on a lever that is locked. */
 void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, float slow_time);
 
 /* Whether there is motion enough to learn from, beyond what the noise of theta_dot looks like. */

@@ -1,10 +1,10 @@
-/* Whether friction holds the lever between its motions (stick-slip). The model knows no standstill, and would learn damping
- * from it.
+/* Whether friction holds the lever between its motions (stick-slip). The model knows no standstill, and would learn
+ * damping from it.
  *
- * Of Gaussian motion a part of about 0.8 r / sigma is slower than r, where r is well below the standard deviation sigma of
- * the rate; of a lever that sticks, more is. Here the rate is the mean over 20 ms, and r a fifth of the rms rate, with the
- * noise of the sensor besides. Not seen: a sinusoid, of which less is slow; motion not much larger than the noise of such a
- * mean; friction that damps, but does not hold. */
+ * Of Gaussian motion a part of about 0.8 r / sigma is slower than r, where r is well below the standard deviation sigma
+ * of the rate; of a lever that sticks, more is. Here the rate is the mean over 20 ms, and r a fifth of the rms rate,
+ * with the noise of the sensor besides. Not seen: a sinusoid, of which less is slow; motion not much larger than the
+ * noise of such a mean; friction that damps, but does not hold. */
 #ifndef FILTER_STICKING_H
 #define FILTER_STICKING_H
 

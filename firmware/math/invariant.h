@@ -1,5 +1,5 @@
-/* What holds whatever comes in: checked in debug builds and by the fuzzers (LEVER_ASSERTIONS), nothing elsewhere. A value
- * that is not a number breaks no invariant: app/estimator.c refuses it. */
+/* Invariants hold whatever the input. With LEVER_ASSERTIONS (debug builds, fuzzers, mutants) one that is broken traps;
+ * elsewhere they compile to nothing. NaN breaks none: app/estimator.c refuses it. */
 #ifndef MATH_INVARIANT_H
 #define MATH_INVARIANT_H
 

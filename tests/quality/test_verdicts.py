@@ -58,7 +58,7 @@ def test_the_readme_prints_the_table(name: str) -> None:
 
 
 def test_the_contract_has_the_same_names() -> None:
-    """Of the evidence only what has a statistic."""
+    """States, which have no statistic, are left out."""
     statistics = [first for first, *_, meaning in rows("evidence") if not meaning.startswith("state")]
     assert list(codec.choices("TEST_RATIO", "evidence").values()) == statistics == list(TEST_RATIOS)
     assert list(codec.choices("TEST_RATIO", "verdict").values()) == [first for first, *_ in rows("verdict")]

@@ -21,7 +21,7 @@ FREQUENCIES: FloatArray = np.array(FEEDTHROUGH_FREQUENCIES, dtype=np.float64)
 
 
 class Feedthrough(InTurn):
-    """Kept of samples as they come."""
+    """Keeps the feedthrough at each frequency, of samples as they come."""
 
     def __init__(self) -> None:
         super().__init__([column for column, _, _ in FEEDTHROUGH], FREQUENCIES)

@@ -1,4 +1,4 @@
-"""What is sent one after the other, each in its turn, from the columns of a trace: put side by side."""
+"""Puts side by side what a message sends in turn, from the columns of a trace: a frequency or a statistic a frame."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _THINNED = 0.5  # [s]
 
 
 class InTurn:
-    """Kept of samples as they come: what belongs to each key twice a second, at most."""
+    """Keeps what belongs to each key, twice a second at most, of samples as they come."""
 
     def __init__(self, columns: Sequence[str], keys: FloatArray) -> None:
         """`columns` of the trace, of which the first says what the others belong to: one of the keys, from 0 to 15."""

@@ -18,7 +18,7 @@ TEST_RATIO = (
 
 
 class TestRatios(InTurn):
-    """Kept of samples as they come."""
+    """Keeps the ratio of each statistic, of samples as they come."""
 
     __test__ = False  # no class of tests, for pytest
 

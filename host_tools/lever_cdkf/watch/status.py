@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ..can import codec
+from ..firmware.estimator import TEST_RATIOS
 from ..firmware.library import enum_names, enum_words
 from .picture import Picture
 
@@ -59,10 +60,9 @@ def bounce(picture: Picture) -> tuple[str, str] | None:
 def nearest_evidence(picture: Picture) -> str | None:
     """Return the three statistics that are nearest to their thresholds, or over them; None where they are not sent."""
     ratios = picture.test_ratios()
-    names = codec.choices("TEST_RATIO", "evidence")
-    nearest = sorted((key for key in ratios if key in names), key=lambda key: -ratios[key])[:3]
-    texts = [f"{names[key].replace('_', ' ')} {ratios[key]:.2f}" for key in nearest]
-    return f"{', '.join(texts)} (of 1)" if texts else None
+    nearest = sorted((key for key in ratios if key < len(TEST_RATIOS)), key=lambda key: -ratios[key])[:3]
+    texts = [f"{TEST_RATIOS[key].replace('_', ' ')} {ratios[key]:.2f}" for key in nearest]
+    return f"{', '.join(texts)} (threshold 1)" if texts else None
 
 
 def last_reset(picture: Picture) -> str | None:

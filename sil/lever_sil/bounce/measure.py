@@ -395,7 +395,7 @@ def _total(values: FloatArray) -> float:
 
 
 def _rms(values: FloatArray) -> float:
-    """Of runs; NaN where one has none."""
+    """Return the root mean square over the runs that have a value."""
     return float(measures.rms(values[~np.isnan(values)]))
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from lever_cdkf.cli.tables import Cell, Row
 from lever_cdkf.firmware.config import setting, settings_table
-from lever_cdkf.firmware.native import Config, run_samples
+from lever_cdkf.firmware.native import Config, lib, run_samples
 from lever_cdkf.models.lever import Lever
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.text.units import GRAVITY
@@ -162,8 +162,8 @@ def _fit(
     return best, np.sqrt(_TAPERED * np.abs(np.diag(np.linalg.pinv(slopes @ slopes.T))))
 
 
-BASE_FAULT = 8
-"""LEVER_FAULT_BASE: base acceleration missing or stuck."""
+BASE_FAULT: int = lib.LEVER_FAULT_BASE
+"""Base acceleration missing or stuck."""
 
 
 def firmware(y: Array, truth: Array) -> tuple[Found, Array]:

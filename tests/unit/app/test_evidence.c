@@ -1,4 +1,4 @@
-/* Each item of evidence: it must be found, within its time and with its hysteresis, and nothing where nothing is wrong. */
+/* Each item of evidence must be found, within its time and with its hysteresis, and nothing where nothing is wrong. */
 #include "app/evidence.h"
 #include "lever_cdkf.h"
 
@@ -347,8 +347,8 @@ TEST(angle_and_rate_that_do_not_agree_say_nothing_of_the_base)
     TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_KINEMATICS));
 }
 
-/* Two seconds of samples of 1 ms in blocks of 20: asked is a sine of 3 Hz, measured a gain times that and a sine of 4 Hz.
- * Returns after how many blocks it was wrong, 0: never. */
+/* Two seconds of samples of 1 ms in blocks of 20: asked is a sine of 3 Hz, measured a gain times that and a sine of
+ * 4 Hz. Returns after how many blocks it was wrong, 0: never. */
 static uint32_t torque_wrong_after(double amplitude, double gain, double other)
 {
     uint32_t after = 0u;
@@ -404,7 +404,8 @@ TEST(a_torque_that_follows_again_is_right_and_without_dither_nothing_is_said)
 }
 
 /* Sums forget with 0.5 s, and while the base is wrong with 0.2 s; from a standard deviation of 0.1 on, and 0.2, they
- * count: of a gain of 0 and of 1. Nothing is held against it before the arm is known, but while the parameters are held. */
+ * count: of a gain of 0 and of 1. Nothing is held against it before the arm is known, but while the parameters are
+ * held. */
 TEST(the_verdict_on_the_base_waits_until_it_is_sure)
 {
     static const struct {
@@ -515,7 +516,7 @@ TEST(torque_of_somebody_else_is_more_than_the_noise_of_the_sensor)
     TEST_ASSERT_TRUE(evidence_has_other_torque(&evidence));
 }
 
-/* What was compared with parameters that were held begins anew. */
+/* A comparison with parameters that were held begins anew when they learn again. */
 TEST(parameters_that_learn_again_have_no_past)
 {
     evidence.base = (score_t){-100.0f, 100.0f};

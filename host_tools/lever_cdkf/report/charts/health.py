@@ -1,4 +1,4 @@
-"""What the estimator says of itself: its mode, the faults it sees and how near others are, and what the bus lost."""
+"""Charts of the estimator's own state: its mode, its faults and how near others are, and the frames that were lost."""
 
 import numpy as np
 
