@@ -5,8 +5,8 @@
 
 #include <stddef.h>
 
-#define MARGIN_US 40000u  /* least time between two margins */
-#define SILENCE_US 20000u /* or 1.25 sample periods: mitigation.h */
+#define MARGIN_US 40000u         /* least time between two margins */
+#define BOUNCE_SILENCE_US 20000u /* or 1.25 sample periods: mitigation.h */
 
 void bounce_choose(bounce_t *bounce, uint8_t mitigation)
 {
@@ -83,7 +83,7 @@ void bounce_mitigate(
     const uint32_t faults = estimator->faults;
     mitigation_sample_t sample = {.constants = &setup->constants,
         .elapsed_us = to_gate->advances ? to_gate->elapsed_us : period_us,
-        .silence_us = greater_count(late_us, SILENCE_US),
+        .silence_us = greater_count(late_us, BOUNCE_SILENCE_US),
         .theta = estimator_state(estimator, 0u),
         .theta_dot = estimator_state(estimator, 1u),
         .drive = gate->gain,

@@ -1,6 +1,7 @@
 #include "app/dither.h"
 
 #include "math/bounds.h"
+#include "math/trigonometry.h"
 
 #include <math.h>
 #include <string.h>
@@ -64,8 +65,8 @@ static float band_variance(const dither_t *dither)
 void dither_init(dither_t *dither, float low, float high, float period, float rms_most, float fade)
 {
     const float highest = HIGHEST / period;
-    dither->low = (HIGH_PASS_TURN * period) * low; /* 2 Hz of at least 50 samples a second */
-    dither->high = (HIGH_PASS_TURN * period) * lesser(high, highest);
+    dither->low = (TURN * period) * low; /* 2 Hz of at least 50 samples a second */
+    dither->high = (TURN * period) * lesser(high, highest);
     dither->scale = sqrtf(3.0f / band_variance(dither)); /* uniform() has a variance of 1/3 */
     dither->rms_most = rms_most;
     dither->fade = fade / period;

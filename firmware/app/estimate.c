@@ -6,8 +6,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#define TURN 6.28318531f
-
 float estimator_state(const estimator_t *estimator, uint32_t i)
 {
     return estimator->trim.origin[i] + estimator->cdkf.x[i];

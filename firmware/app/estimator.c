@@ -2,6 +2,7 @@
 #include "app/alignment.h"
 #include "app/prediction.h"
 #include "math/bounds.h"
+#include "math/elapsed.h"
 #include "math/share.h"
 
 #include <math.h>
@@ -12,7 +13,6 @@
 #define RATE_OF_ANGLE 2.0f      /* presumed rate over angle where theta_dot is not measured, in corners of the trim */
 #define CLOCK_MIN 0.25f         /* of a sample_period: a clock that advances by less is treated as stopped */
 #define OTHER_MAX 1.0e4f        /* plausibility limit of every signal except theta [rad/s], [N m], [m/s^2] */
-#define HALF_TURN_OF_TIME 0x80000000u
 
 static void note(estimator_t *estimator, bool present, enum lever_fault fault)
 {

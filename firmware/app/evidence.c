@@ -8,35 +8,37 @@
 #include <stddef.h>
 #include <string.h>
 
-#define NIS_TIME 0.1f          /* of nis_fast, and of motion.fast [s] */
-#define NIS_MAX 100.0f         /* of a single sample, so that the means recover */
-#define SURPRISED 1.3f         /* nis_fast with which a signal that stands still is stuck; in flight it is 1 +- 0.07 */
-#define ALIVE 0.4f             /* a base acceleration that changed for so long never stands still [s] */
-#define BASE_MEMORY 0.5f       /* [s], */
-#define BASE_MEMORY_WRONG 0.2f /* and while it is wrong */
-#define BASE_DOUBT 0.35f       /* standard deviation of the gain up to which there may be doubt, */
-#define BASE_SURE 0.1f         /* standard deviation of the gain up to which it counts, */
-#define BASE_SURE_WRONG 0.2f   /* and while the base is wrong, when the state hardly follows it */
-#define AGREEMENT_MEMORY 0.5f  /* of motor and kinematics [s] */
-#define TORQUE_MIN 4e-4f       /* mean square of the command from which on it says anything [N^2 m^2] */
-#define TORQUE_SURE 1.6f       /* torque of other origin over the command, both rms, that this is allowed times */
-#define KINEMATICS_CORNER 5.0f /* of the high-pass [rad/s] */
-#define KINEMATICS_STEP 0.03f  /* of the angle from sample to sample, from which on it is none of the lever [rad] */
-#define KINEMATICS_MIN 1e-6f   /* mean square of the integral from which on it says anything [rad^2] */
-#define KINEMATICS_BLOCK 0.02f /* more often than this the sums hardly get new information [s] */
-#define KINEMATICS_BLOCKS 4.0f /* from which on the gain has a standard deviation */
-#define KINEMATICS_SURE 2.5f   /* standard deviations that the gain may be off */
-#define OTHER_SHARE 0.01f      /* of its mean, by one sample in EVIDENCE_TORQUE_EVERY */
-#define OTHER_LEAST 2.5e-3f    /* mean square that is more than noise of the sensor [N^2 m^2] */
-#define AWAKE 0.3f             /* a rest lasts so much longer than the lack of motion [s] [rest_120s, freed] */
-#define REGRIP_TIME 0.038f     /* two blocks: a new grip is complete [s] [grip_step] */
-#define PROBATION 0.29f        /* until then a change has to explain the innovations [s] [rough_on_off] */
-#define EXPLAINED 0.6f         /* and leave no more of EVIDENCE_NOISE at its end */
-#define TRANSIENT 1.0f         /* innovations are noise again, and not of the change [s] */
-#define DOUBT 0.6f             /* of EVIDENCE_BASE from which on the sensor is to be judged before a change */
-#define HELD 0.043f            /* EVIDENCE_HANDS above which nobody may hold the lever any more */
-#define TORQUE_UNKNOWN 1.2f    /* nis_fast at a change from which on torque is thought to have changed, too, */
-#define TORQUE_ALL 2.0f        /* and by as much as can be */
+#define NIS_TIME 0.1f           /* of nis_fast, and of motion.fast [s] */
+#define NIS_MAX 100.0f          /* of a single sample, so that the means recover */
+#define SURPRISED 1.3f          /* nis_fast with which a signal that stands still is stuck; in flight it is 1 +- 0.07 */
+#define ALIVE 0.4f              /* a base acceleration that changed for so long never stands still [s] */
+#define BASE_MEMORY 0.5f        /* [s], */
+#define BASE_MEMORY_WRONG 0.2f  /* and while it is wrong */
+#define BASE_DOUBT 0.35f        /* standard deviation of the gain up to which there may be doubt, */
+#define BASE_SURE 0.1f          /* standard deviation of the gain up to which it counts, */
+#define BASE_SURE_WRONG 0.2f    /* and while the base is wrong, when the state hardly follows it */
+#define AGREEMENT_MEMORY 0.5f   /* of motor and kinematics [s] */
+#define TORQUE_MIN 4e-4f        /* mean square of the command from which on it says anything [N^2 m^2] */
+#define TORQUE_SURE 1.6f        /* torque of other origin over the command, both rms, that this is allowed times */
+#define KINEMATICS_CORNER 5.0f  /* of the high-pass [rad/s] */
+#define KINEMATICS_STEP 0.03f   /* of the angle from sample to sample, from which on it is none of the lever [rad] */
+#define KINEMATICS_LINE 0.0105f /* the rate is on a straight line between samples that are so close [s] */
+#define KINEMATICS_MIN 1e-6f    /* mean square of the integral from which on it says anything [rad^2] */
+#define KINEMATICS_BLOCK 0.02f  /* more often than this the sums hardly get new information [s] */
+#define KINEMATICS_BLOCKS 4.0f  /* from which on the gain has a standard deviation */
+#define KINEMATICS_SURE 2.5f    /* standard deviations that the gain may be off */
+#define OTHER_SHARE 0.01f       /* of its mean, by one sample in EVIDENCE_TORQUE_EVERY */
+#define OTHER_LEAST 2.5e-3f     /* mean square that is more than noise of the sensor [N^2 m^2] */
+#define OFFSET_MAX 0.02f        /* of theta: f_n, which is that at the angle shown, is off by its sigma [rad] */
+#define AWAKE 0.3f              /* a rest lasts so much longer than the lack of motion [s] [rest_120s, freed] */
+#define REGRIP_TIME 0.038f      /* two blocks: a new grip is complete [s] [grip_step] */
+#define PROBATION 0.29f         /* until then a change has to explain the innovations [s] [rough_begins] */
+#define EXPLAINED 0.6f          /* and leave no more of EVIDENCE_NOISE at its end */
+#define TRANSIENT 1.0f          /* innovations are noise again, and not of the change [s] */
+#define CHANGE_WAITS 0.6f       /* of EVIDENCE_BASE from which on the sensor is to be judged before a change */
+#define HELD 0.043f             /* EVIDENCE_HANDS above which nobody may hold the lever any more */
+#define TORQUE_UNKNOWN 1.2f     /* nis_fast at a change from which on torque is thought to have changed, too, */
+#define TORQUE_ALL 2.0f         /* and by as much as can be */
 
 typedef struct evidence_row {
     float inverse; /* of the threshold */
@@ -128,8 +130,8 @@ void evidence_add_outputs(evidence_t *evidence, const float y[CDKF_OUTPUTS], boo
     kinematics_t *of = &evidence->kinematics;
     const float turn = KINEMATICS_CORNER * elapsed;
     const float change[2] = {y[0] - of->last[0], (0.5f * elapsed) * (y[1] + of->last[1])};
-    const bool on =
-        both && evidence->paired && (elapsed < (1.5f * period)) && (fabsf(change[0] - change[1]) < KINEMATICS_STEP);
+    const bool on = both && evidence->paired && (elapsed < greater(1.5f * period, KINEMATICS_LINE)) &&
+                    (fabsf(change[0] - change[1]) < KINEMATICS_STEP);
     for (uint32_t i = 0u; i < 2u; i++) {
         of->passed[i] = on ? ((1.0f - turn) * (of->passed[i] + change[i])) : 0.0f;
         of->level[i] = on ? (of->level[i] + (turn * (of->passed[i] - of->level[i]))) : 0.0f;
@@ -276,6 +278,8 @@ static void judge_states(evidence_t *evidence, const cdkf_t *cdkf, const evidenc
     evidence->awake = evidence_has(evidence, EVIDENCE_REST) ? 0.0f : lesser(evidence->awake + block->period, AWAKE);
     evidence_note(evidence, EVIDENCE_REST, evidence->awake < (AWAKE - 0.001f));
     evidence_note(evidence, EVIDENCE_REGRIP, since < REGRIP_TIME);
+    evidence->offset = block->held ? evidence->offset : 0.0f;
+    evidence_note(evidence, EVIDENCE_OFFSET, fabsf(evidence->offset) > OFFSET_MAX);
     const float transient = evidence->opened ? CHANGE_REPORTED : TRANSIENT;
     evidence_note(evidence, EVIDENCE_NEW, !block->held && ((cdkf->trust < 1.0f) || (since < transient)));
     const bool passed = (since >= PROBATION) || evidence_has(evidence, EVIDENCE_CHANGE); /* this one, or one before */
@@ -320,7 +324,8 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
         sticking_judge(&evidence->sticking, evidence->motion.slow, cdkf->output_noise[1], moves));
     (void)evidence_set(evidence, EVIDENCE_COLOUR, whiteness_correlation(&evidence->whiteness));
     if (adapts && moves && !block->held &&
-        (evidence->ratio[EVIDENCE_BASE] < DOUBT)) { /* of an arm that has changed meanwhile it would say the same */
+        (evidence->ratio[EVIDENCE_BASE] <
+            CHANGE_WAITS)) { /* of an arm that has changed meanwhile it would say the same */
         (void)evidence_set(evidence, EVIDENCE_CALIBRATION, calibration_step(&evidence->calibration, cdkf, period));
     }
     (void)evidence_set(evidence, EVIDENCE_INNOVATION, evidence->nis_slow);
@@ -347,7 +352,7 @@ bool evidence_of_change(evidence_t *evidence, const correction_t *correction, co
     if (ratio > 1.0f) {
         change_detection_restart(&evidence->change);
     }
-    return (ratio > 1.0f) && ((since >= CHANGE_REPORTED) || again) && (evidence->ratio[EVIDENCE_BASE] < DOUBT);
+    return (ratio > 1.0f) && ((since >= CHANGE_REPORTED) || again) && (evidence->ratio[EVIDENCE_BASE] < CHANGE_WAITS);
 }
 
 void evidence_begin_change(evidence_t *evidence, bool known, bool opened)

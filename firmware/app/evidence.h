@@ -69,6 +69,7 @@ typedef struct evidence {
     stillness_t stillness[SIGNAL_COUNT];
     float awake;                 /* time since there was too little motion [s] */
     float alive;                 /* time in which the base acceleration has changed all the time [s] */
+    float offset;                /* by which theta has jumped, and the rate not, since the parameters learnt [rad] */
     float refused[CDKF_OUTPUTS]; /* time for which samples of an output have been refused [s] */
     input_gate_t input[INPUT_COUNT];
     score_t base;       /* of CDKF_BASE_GAIN, with exponential forgetting */

@@ -8,11 +8,11 @@
 
 #if LEVER_GRIP_FORCE
 
-#define MEMORY 10.0f   /* of the comparison, and of the mean square [s] */
-#define TIME_MIN 2.0f  /* before the comparison says that it is wrong [s] */
-#define TOLERATED 0.2f /* what the lever's own equation may be off */
-#define SURE 2.0f      /* standard deviations of the comparison */
-#define WALK_MIN 1e-3f /* q [1/sqrt(s)] */
+#define GRIP_FORCE_MEMORY 10.0f /* of the comparison, and of the mean square [s] */
+#define GRIP_FORCE_MIN 2.0f     /* before the comparison says that it is wrong [s] */
+#define TOLERATED 0.2f          /* what the lever's own equation may be off */
+#define SURE 2.0f               /* standard deviations of the comparison */
+#define WALK_MIN 1e-3f          /* q [1/sqrt(s)] */
 
 /* Takes a valid force, or notes that it is missing. After an outage its level is a guess. */
 static void receive(grip_force_t *grip, const setup_t *setup, trim_t *trim, const float *force, float period)
@@ -70,7 +70,7 @@ bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, con
         float now = grip->raw;
         trim_inputs(trim, &now, TRIM_GRIP_FORCE, 1u, period);
         grip->impulse += (period * setup->constants.length) * now;
-        grip->square += share_of(period, MEMORY) * ((now * now) - grip->square);
+        grip->square += share_of(period, GRIP_FORCE_MEMORY) * ((now * now) - grip->square);
         grip->settling -= period;
         if (known) {
             look(grip, setup, step, now, alone, error, seen);
@@ -84,7 +84,7 @@ bool grip_force_step(grip_force_t *grip, const setup_t *setup, trim_t *trim, con
 static float compare(grip_force_t *grip, const lever_settings_t *s, const hands_block_t *hands)
 {
     grip_comparison_t *means = &grip->means;
-    means->time += (means->time < MEMORY) ? hands->length : 0.0f;
+    means->time += (means->time < GRIP_FORCE_MEMORY) ? hands->length : 0.0f;
     const float share = hands->length / means->time; /* a mean first, and then one with exponential forgetting */
     const float difference = grip->impulse - hands->of_hand;
     means->measured += share * ((grip->impulse * hands->driven) - means->measured);
@@ -95,7 +95,7 @@ static float compare(grip_force_t *grip, const lever_settings_t *s, const hands_
     const float off = fabsf(means->measured - means->expected);
     const float sure = SURE * sqrtf(means->drive_square * (means->difference_square * share));
     grip->right = ((off + sure) < limit);
-    const float away = (means->time > TIME_MIN) ? (off / greater(limit + sure, 1.0e-9f)) : 0.0f;
+    const float away = (means->time > GRIP_FORCE_MIN) ? (off / greater(limit + sure, 1.0e-9f)) : 0.0f;
     grip->wrong = grip->wrong || (away > 1.0f);
     return away;
 }

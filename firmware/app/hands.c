@@ -5,7 +5,7 @@
 #include <string.h>
 
 #define BLOCK 0.038f /* [s]: two blocks of learning. In less, the noise of theta_dot is a good part of the change */
-#define MEMORY 0.16f /* [s] */
+#define HANDS_MEMORY 0.16f /* [s] */
 
 void hands_start(hands_t *hands)
 {
@@ -45,7 +45,7 @@ hands_block_t hands_step(hands_t *hands, const model_constants_t *constants, flo
         const float change = theta_dot - hands->begin;
         const float residual = change - (hands->impulse / constants->inertia);
         if (!hands->idle) {
-            const float share = share_of(hands->elapsed, MEMORY);
+            const float share = share_of(hands->elapsed, HANDS_MEMORY);
             hands->change += share * ((change * change) - hands->change);
             hands->residual += share * ((residual * residual) - hands->residual);
         }

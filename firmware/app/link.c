@@ -7,11 +7,10 @@
 
 #define BIT(output) ((uint32_t)1u << (uint32_t)(output))
 #define EVERY_PAGE ((1u << (uint32_t)MESSAGE_PAGE_COUNT) - 1u)
-#define IDENTITY_US 1000000u
-#define DUPLICATE_US 2000000u
-#define HALF_TURN_OF_TIME 0x80000000u
-#define LONG_AGO_US 0x40000000u
-#define COUNTERS 16u
+#define IDENTITY_US 1000000u    /* from one IDENTITY to the next */
+#define DUPLICATE_US 2000000u   /* another estimator is reported for so long */
+#define LONG_AGO_US 0x40000000u /* no time of this protocol is longer */
+#define COUNTERS 16u            /* values of an E2E counter */
 
 /* The divided messages, in the order in which they are sent in each publish_period. */
 static const uint16_t parts[] = {(uint16_t)(BIT(OUTPUT_HEALTH) | BIT(OUTPUT_STABILITY)),

@@ -11,6 +11,7 @@
 #define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
 #define RATE_MOST 1.0e4f  /* [rad/s] */
 #define REST_RATE 6.0f    /* of the mean of the trim angle, which itself follows motion of 1 to 3 Hz in full [1/s] */
+#define JUMP 0.03f        /* of the angle while it was refused, which the rate does not explain [rad] [theta_step] */
 #define SUBSTEPS_MOST 12u /* predictions through a gap: bounds the time of one call */
 
 /* Torque of one newton metre of Coulomb friction, smooth about standstill. Of a rate that is none it is none: what is
@@ -127,6 +128,19 @@ static float follow_input(trim_t *trim, bool valid, float missing, float elapsed
     return valid ? 0.0f : (missing + elapsed);
 }
 
+/* An angle that has jumped while the rate went on, and stays there, has another offset: its level takes it. */
+static void take_offset(estimator_t *estimator, const checked_t *sample)
+{
+    trim_t *trim = &estimator->trim;
+    evidence_t *evidence = &estimator->learning.evidence;
+    const bool believed = sample->valid[0] && (evidence->refused[0] > 0.0f);
+    const float jump = sample->y[0] - (trim->last[0] + (trim->missing[0] * sample->y[1]));
+    if (believed && sample->valid[1] && (evidence->refused[1] <= 0.0f) && trim->deviations && (fabsf(jump) > JUMP)) {
+        trim_shift(trim, jump);
+        evidence->offset += jump;
+    }
+}
+
 /* An output far from what is expected is not valid. */
 static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elapsed)
 {
@@ -142,6 +156,7 @@ static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elaps
             estimator->faults |= (i == 0u) ? (uint32_t)LEVER_FAULT_THETA : (uint32_t)LEVER_FAULT_THETA_DOT;
         }
     }
+    take_offset(estimator, sample);
 }
 
 void prediction_advance(
@@ -161,5 +176,6 @@ void prediction_advance(
         estimator->setup.settings->sample_period);
     if (subtract_trim(estimator, sample->y, sample->valid, period)) {
         trim_unsettle(&estimator->trim);
+        estimator->learning.evidence.offset = 0.0f; /* the angle is what it is now */
     }
 }

@@ -4,10 +4,9 @@
 #include "can/messages.h"
 #include "math/bounds.h"
 #include "math/crc32.h"
+#include "math/elapsed.h"
 
 #include <string.h>
-
-#define HALF_TURN_OF_TIME 0x80000000u
 
 #define FRAME_DATA 6u /* bytes of the state in a frame */
 #define FRAMES (2u + ((((uint32_t)LEVER_STATE_BYTES + FRAME_DATA) - 1u) / FRAME_DATA)) /* with begin and end */

@@ -5,7 +5,6 @@
 
 #include <stddef.h>
 
-#define TURN 6.28318531f
 #define DELAY_WHOLE 0.99f /* a delay is rounded up, but for a hundredth of a sample */
 
 const model_t *setup_model(uint8_t model)

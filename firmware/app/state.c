@@ -9,14 +9,14 @@
 #include <stddef.h>
 #include <string.h>
 
-#define ANY_BYTE 0xFFu
-#define ANY_HALF 0xFFFFu
-#define COUNTER 15u /* of E2E */
-#define FLAG 1u
+#define ANY_BYTE 0xFFu   /* no limit of a byte, */
+#define ANY_HALF 0xFFFFu /* and of two */
+#define COUNTER 15u      /* of E2E */
+#define FLAG 1u          /* the most that a flag may be */
 #define EVERY_EVIDENCE (((uint32_t)1u << (uint32_t)EVIDENCE_COUNT) - 1u)
-#define BYTE_BITS 8u
-#define FLOAT_LIMIT 1.0e9f
-#define MODERATE 1.0e6f
+#define BYTE_BITS 8u       /* in a byte */
+#define FLOAT_LIMIT 1.0e9f /* no member is as large */
+#define MODERATE 1.0e6f    /* members whose squares are used */
 
 enum { SINGLE = 9, GROUPS = 4 }; /* floats of an estimate that are no array; these and its arrays */
 
@@ -314,8 +314,8 @@ static bool is_drawn(const estimator_t *estimator)
 /* The filter's invariant, and that its factors are triangular. */
 static bool is_belief(const cdkf_t *cdkf)
 {
-    return cdkf_is_valid(cdkf) && factor_is_lower(cdkf->s, MODEL_PARAMETERS) &&
-           factor_is_lower(cdkf->s_xx, MODEL_STATES);
+    return cdkf_is_valid(cdkf) && factor_is_whole(cdkf->s, MODEL_PARAMETERS) &&
+           factor_is_whole(cdkf->s_xx, MODEL_STATES);
 }
 
 /* A belief that may be returned to keeps the invariant, and all that is stated of it is finite. */

@@ -6,15 +6,15 @@
 #include <math.h>
 #include <string.h>
 
-#define KEEP_ALIVE_US 1000000u
-#define SILENCE_US 20000u
-#define SILENCE_PERIODS 3u
-#define IDLE_US 5000u         /* longest time from a sample to torque_gate_idle(), or the next sample */
-#define CLOSING_US 40000.0f   /* so that a step of the port's clock is left of 50 ms */
-#define TORQUE_LEAST 1.0e-6f  /* a fade is never slower than that of this torque: one of 1e-40 would not end [N m] */
-#define MEMORY 0.25f          /* of the mean square [s], or in windows of torque_rms, of 1 s */
-#define MEMORY_PER_US 4.0e-6f /* 1 / that, in us */
-#define ROOM 0.2f             /* part of square_most in which the amplitude falls, at least */
+#define KEEP_ALIVE_US 1000000u     /* torque ends so long after the last accepted command */
+#define TORQUE_SILENCE_US 20000u   /* without a sample it ends after this, */
+#define TORQUE_SILENCE_PERIODS 3u  /* or so many sample periods, if that is longer */
+#define IDLE_US 5000u              /* longest time from a sample to torque_gate_idle(), or the next sample */
+#define TORQUE_CLOSING_US 40000.0f /* so that a step of the port's clock is left of 50 ms */
+#define TORQUE_LEAST 1.0e-6f /* a fade is never slower than that of this torque: one of 1e-40 would not end [N m] */
+#define TORQUE_MEMORY 0.25f  /* of the mean square [s], or in windows of torque_rms, of 1 s */
+#define TORQUE_MEMORY_PER_US 4.0e-6f /* 1 / that, in us */
+#define ROOM 0.2f                    /* part of square_most in which the amplitude falls, at least */
 
 /* Room of the mean square below square_most in which the amplitude allowed falls from the limit to what may stay for
  * ever: wide enough that it falls no faster than torque_slew, and that the longest step leaves the mean square
@@ -22,8 +22,8 @@
 static float room_of(const torque_gate_t *gate, float slew)
 {
     const float beyond = gate->limit - gate->sustained;
-    const float share = (float)gate->silence_us * MEMORY_PER_US;
-    const float by_slew = (beyond * gate->limit * gate->limit) / (MEMORY * slew);
+    const float share = (float)gate->silence_us * TORQUE_MEMORY_PER_US;
+    const float by_slew = (beyond * gate->limit * gate->limit) / (TORQUE_MEMORY * slew);
     const float by_step = (beyond * (gate->limit + gate->sustained) * share) / (1.0f - share);
     return greater(greater(by_slew, by_step), ROOM * gate->square_most);
 }
@@ -33,11 +33,11 @@ void torque_gate_init(torque_gate_t *gate, const lever_settings_t *settings)
     (void)memset(gate, 0, sizeof *gate);
     const float fade_steps = settings->dither_fade / settings->sample_period;
     gate->period_us = microseconds_of(settings->sample_period);
-    gate->silence_us = greater_count(SILENCE_PERIODS * gate->period_us, SILENCE_US);
+    gate->silence_us = greater_count(TORQUE_SILENCE_PERIODS * gate->period_us, TORQUE_SILENCE_US);
     gate->limit = settings->torque_limit;
     gate->slew = settings->torque_slew * 1.0e-6f;
     gate->open_step = 1.0f / greater(fade_steps, 1.0f);
-    gate->square_most = (settings->torque_rms * settings->torque_rms) / (1.0f + MEMORY);
+    gate->square_most = (settings->torque_rms * settings->torque_rms) / (1.0f + TORQUE_MEMORY);
     gate->sustained = sqrtf(gate->square_most);
     if (gate->limit > gate->sustained) {
         gate->amplitude_slope = (gate->limit - gate->sustained) / room_of(gate, settings->torque_slew);
@@ -56,7 +56,7 @@ void torque_gate_close(torque_gate_t *gate)
     if (gate->open) {
         gate->open = false;
         gate->gain = 0.0f;
-        gate->closing = greater(fabsf(gate->torque), TORQUE_LEAST) / CLOSING_US;
+        gate->closing = greater(fabsf(gate->torque), TORQUE_LEAST) / TORQUE_CLOSING_US;
     }
 }
 
@@ -76,7 +76,7 @@ static void fade(torque_gate_t *gate, uint32_t elapsed_us)
 /* Time has passed with the torque as it was; what is too old by now closes the gate, and it has been fading since. */
 static void age(torque_gate_t *gate, uint32_t elapsed_us)
 {
-    const float share = (float)elapsed_us * MEMORY_PER_US;
+    const float share = (float)elapsed_us * TORQUE_MEMORY_PER_US;
     gate->mean_square += lesser(share, 1.0f) * ((gate->torque * gate->torque) - gate->mean_square);
     gate->output_left = time_left(gate->output_left, elapsed_us);
     gate->command_left = time_left(gate->command_left, elapsed_us);

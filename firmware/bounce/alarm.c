@@ -2,7 +2,8 @@
 
 #define ALARM_SIGMA_MOST 3.0f /* an arm that is less certain says nothing [dB] */
 #define QUANTILE 0.842f       /* 80 % of a normal distribution lie below that many standard deviations */
-#define DOUBT 1.5f /* by so much a margin has to be further below the limit where the model does not fit [dB] */
+#define MISMATCH_DOUBT                                                                                                 \
+    1.5f /* by so much a margin has to be further below the limit where the model does not fit [dB] */
 
 /* Hysteresis: entering and leaving a state both need 80 % confidence in the arm. An error of the table lasts for the
  * flight, so that waiting makes it no smaller: who made the table has the limit for that. */
@@ -16,7 +17,7 @@ uint8_t alarm_next(uint8_t state, const margin_t *margin, const lever_aircraft_t
 {
     const bool is_alarm = (state == (uint8_t)LEVER_BOUNCE_ALARM);
     const bool known = carried && (margin->arm_sigma <= ALARM_SIGMA_MOST); /* NaN is not */
-    const float limit = aircraft->alarm - ((doubtful && !is_alarm) ? DOUBT : 0.0f);
+    const float limit = aircraft->alarm - ((doubtful && !is_alarm) ? MISMATCH_DOUBT : 0.0f);
     uint8_t next = (uint8_t)LEVER_BOUNCE_CLEAR;
     if (known && is_below(is_alarm, limit, margin)) {
         next = (uint8_t)LEVER_BOUNCE_ALARM;

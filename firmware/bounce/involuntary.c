@@ -1,13 +1,14 @@
 #include "bounce/involuntary.h"
 
 #include "math/bounds.h"
+#include "math/trigonometry.h"
 
 #include <math.h>
 #include <string.h>
 
-#define STIFFNESS_LEAST 10.0f /* natural frequency of 0.5 Hz [1/s^2] */
-#define PERIOD_MOST 0.02f     /* of a step of integration [s] */
-#define STEPS_MOST 5.0f       /* in a call */
+#define STIFFNESS_LEAST 10.0f  /* natural frequency of 0.5 Hz [1/s^2] */
+#define INTEGRATION_MOST 0.02f /* of a step of integration [s] */
+#define CALL_STEPS_MOST 5.0f   /* in a call */
 
 void involuntary_start(involuntary_t *involuntary, float z_ddot)
 {
@@ -44,14 +45,14 @@ bool involuntary_step(involuntary_t *involuntary, const model_dynamics_t *dynami
 {
     model_step_t part = *step;
     uint32_t steps = 1u;
-    if (step->period > PERIOD_MOST) {
-        const float whole = (step->period / PERIOD_MOST) + 0.999f;
-        steps = (uint32_t)lesser(whole, STEPS_MOST);
+    if (step->period > INTEGRATION_MOST) {
+        const float whole = (step->period / INTEGRATION_MOST) + 0.999f;
+        steps = (uint32_t)lesser(whole, CALL_STEPS_MOST);
         part.period = step->period / (float)steps;
     }
     const bool stable = (dynamics->stiffness > STIFFNESS_LEAST) && (dynamics->damping > 0.0f);
     for (uint32_t i = 0u; stable && (i < steps); i++) {
-        integrate(involuntary, dynamics, constants, &part, HIGH_PASS_TURN * (corner * part.period));
+        integrate(involuntary, dynamics, constants, &part, TURN * (corner * part.period));
     }
     const bool plausible = stable && (fabsf(involuntary->theta) <= MODEL_THETA_MOST); /* NaN is not */
     if (!plausible) {

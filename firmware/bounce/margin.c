@@ -3,11 +3,11 @@
 #include "filter/derived.h"
 #include "math/bounds.h"
 #include "math/exponential.h"
+#include "math/trigonometry.h"
 #include "model/base_motion.h"
 
 #include <math.h>
 
-#define TURN 6.28318531f
 #define MARGIN_MOST 40.0f    /* where L does not cross the positive real axis, or not far from 0 [dB] */
 #define LEAST_HEIGHT 0.01f   /* of L on the real axis: MARGIN_MOST */
 #define DECIBELS 8.68588964f /* 20 / ln(10) */
@@ -17,7 +17,7 @@
 #define SIDE 0.1f            /* for the slope there, in points of the table */
 #define FINE 0.25f           /* reach of the parabola, in points of the table */
 #define LAST_INTERVAL ((uint32_t)LEVER_AIRCRAFT_POINTS - 2u)
-#define LEAST_POINTS 3u
+#define LEAST_POINTS 3u /* of the table of an aircraft */
 
 /* A loop: the model at one sigma point, and what the aircraft's response is off by. */
 typedef struct loop {

@@ -3,32 +3,33 @@
 #include "math/bounds.h"
 #include "math/elapsed.h"
 #include "math/share.h"
+#include "math/trigonometry.h"
 
 #include <math.h>
 #include <string.h>
 
-#define BAND_LOW 1.5f        /* [Hz] */
-#define BAND_HIGH 8.0f       /* [Hz] */
-#define OPENING_US 5.0e5f    /* [us] */
-#define CLOSING_US 7.0e4f    /* [us] */
-#define SAME_US 22000u       /* a sensor that says the same for longer is stuck, */
-#define SAME_LEAST 8u        /* if for so many samples more than */
-#define SAME_USUAL 3u        /* times the most for which it did lately */
-#define LETTING_GO 0.95f     /* of a correction that no model stands behind any more, what a sample leaves */
-#define MEMORY 0.5f          /* of how the lever moves [s] */
-#define EXPLAINED 0.7f       /* part of what is expected that is there: from here on the correction helps, */
-#define UNEXPLAINED 0.5f     /* and below this it adds to the motion */
-#define LIVELY 2.5e-5f       /* mean square of the rate from which on that can be told: (5 mrad/s)^2 */
-#define LEFT_LEAST 2.25e-4f  /* mean square of an unexplained rate from which on it is taken: (15 mrad/s)^2, */
-#define LEFT_PART 0.05f      /* and this part of the expected one */
-#define WEIGHED_EVERY 8u     /* samples */
-#define SLOW 100.0f          /* squares of the frequencies below which it is the pilot's own, */
-#define SLOW_TURN 10.0f      /* the root of that [rad/s] */
-#define FAST 230.0f          /* and above which it is not: 1.6 and 2.4 Hz [rad^2/s^2] */
-#define FASTEST 2500.0f      /* 8 Hz */
-#define NOTCH_TURN_MOST 0.8f /* corner of the notch times a sample period, up to which it is stable */
-#define PERIOD_MOST 0.02f    /* of a filter's step [s] */
-#define LONGEST 0.1f         /* without a sample, until the filters begin anew [s] */
+#define BAND_LOW 1.5f             /* [Hz] */
+#define BAND_HIGH 8.0f            /* [Hz] */
+#define OPENING_US 5.0e5f         /* [us] */
+#define DAMPING_CLOSING_US 7.0e4f /* [us] */
+#define SAME_US 22000u            /* a sensor that says the same for longer is stuck, */
+#define SAME_LEAST 8u             /* if for so many samples more than */
+#define SAME_USUAL 3u             /* times the most for which it did lately */
+#define LETTING_GO 0.95f          /* of a correction that no model stands behind any more, what a sample leaves */
+#define MOTION_MEMORY 0.5f        /* of how the lever moves [s] */
+#define HELPS 0.7f                /* part of what is expected that is there: from here on the correction helps, */
+#define UNEXPLAINED 0.5f          /* and below this it adds to the motion */
+#define LIVELY 2.5e-5f            /* mean square of the rate from which on that can be told: (5 mrad/s)^2 */
+#define LEFT_LEAST 2.25e-4f       /* mean square of an unexplained rate from which on it is taken: (15 mrad/s)^2, */
+#define LEFT_PART 0.05f           /* and this part of the expected one */
+#define WEIGHED_EVERY 8u          /* samples */
+#define SLOW 100.0f               /* squares of the frequencies below which it is the pilot's own, */
+#define SLOW_TURN 10.0f           /* the root of that [rad/s] */
+#define FAST 230.0f               /* and above which it is not: 1.6 and 2.4 Hz [rad^2/s^2] */
+#define FASTEST 2500.0f           /* 8 Hz */
+#define NOTCH_TURN_MOST 0.8f      /* corner of the notch times a sample period, up to which it is stable */
+#define FILTER_PERIOD_MOST 0.02f  /* of a filter's step [s] */
+#define SILENCE_MOST 0.1f         /* without a sample, until the filters begin anew [s] */
 
 static bool has_notch(uint8_t mitigation)
 {
@@ -44,7 +45,7 @@ static bool has_correction(uint8_t mitigation)
 
 static void fade(float *weight, bool on, float elapsed_us)
 {
-    const float next = *weight + (on ? (elapsed_us / OPENING_US) : -(elapsed_us / CLOSING_US));
+    const float next = *weight + (on ? (elapsed_us / OPENING_US) : -(elapsed_us / DAMPING_CLOSING_US));
     *weight = lesser(greater(next, 0.0f), 1.0f);
 }
 
@@ -121,8 +122,8 @@ lever_correction_t mitigation_correction(const mitigation_t *mitigation)
  * signal, so that torque against it takes energy from the lever. */
 static float pass_band(mitigation_band_t *band, float value, float period)
 {
-    band->low_pass += ((HIGH_PASS_TURN * BAND_HIGH) * period) * (value - band->low_pass); /* about once at most */
-    band->level += ((HIGH_PASS_TURN * BAND_LOW) * period) * (band->low_pass - band->level);
+    band->low_pass += ((TURN * BAND_HIGH) * period) * (value - band->low_pass); /* about once at most */
+    band->level += ((TURN * BAND_LOW) * period) * (band->low_pass - band->level);
     return band->low_pass - band->level;
 }
 
@@ -144,11 +145,11 @@ static float between_0_and_1(float value)
  * it has nothing in common with that. */
 static void compare(mitigation_t *mitigation, float moved, float expected, float period)
 {
-    const float share = share_of(period, MEMORY);
+    const float share = share_of(period, MOTION_MEMORY);
     mitigation->expected_square += share * ((expected * expected) - mitigation->expected_square);
     mitigation->product += share * ((moved * expected) - mitigation->product);
     if (mitigation->expected_square > LIVELY) {
-        const float least = mitigation->explained ? UNEXPLAINED : EXPLAINED;
+        const float least = mitigation->explained ? UNEXPLAINED : HELPS;
         mitigation->explained = (mitigation->product > (least * mitigation->expected_square));
     }
 }
@@ -166,9 +167,9 @@ static void weigh(mitigation_rest_t *rest, float usual)
 /* Takes that away. */
 static float take_rest(mitigation_rest_t *rest, float left, float period, float share, float damping)
 {
-    const float rise = (HIGH_PASS_TURN * BAND_HIGH) * (left - rest->band.low_pass);
+    const float rise = (TURN * BAND_HIGH) * (left - rest->band.low_pass);
     const float angle = pass_band(&rest->band, left, period);
-    const float rate = rise - ((HIGH_PASS_TURN * BAND_LOW) * angle);
+    const float rate = rise - ((TURN * BAND_LOW) * angle);
     rest->square += share * ((angle * angle) - rest->square);
     rest->rate_square += share * ((rate * rate) - rest->rate_square);
     return left - (rest->weight * pass_notch(&rest->notch, left, rest->turn * period, damping));
@@ -205,7 +206,7 @@ static float angle_of(
     } else {
         const float involuntary = mitigation->trust * mitigation->involuntary.theta;
         const float damping = 2.0f * settings->notch_damping_ratio;
-        const float share = share_of(period, MEMORY);
+        const float share = share_of(period, MOTION_MEMORY);
         const float unexplained = sample->theta - involuntary;
         float left = unexplained;
         for (uint32_t i = 0u; i < (uint32_t)MITIGATION_RESTS; i++) {
@@ -239,7 +240,7 @@ static void choose(mitigation_t *mitigation, const mitigation_sample_t *sample)
  * against the involuntary rate: so it is damped as the lever is, and the lever's own motion stays out of it. */
 static void advance(mitigation_t *mitigation, const lever_settings_t *settings, const mitigation_sample_t *sample)
 {
-    const float period = lesser(sample->step.period, PERIOD_MOST);
+    const float period = lesser(sample->step.period, FILTER_PERIOD_MOST);
     model_step_t step = sample->step;
     step.tau_m += sample->drive * (mitigation->expected_damping - mitigation->damping);
     const bool stable = involuntary_step(
@@ -262,7 +263,7 @@ static void advance(mitigation_t *mitigation, const lever_settings_t *settings, 
 bool mitigation_step(mitigation_t *mitigation, const lever_settings_t *settings, const mitigation_sample_t *sample)
 {
     pass_gate(mitigation, sample);
-    if (!mitigation->started || (sample->step.period > LONGEST)) { /* then all has faded */
+    if (!mitigation->started || (sample->step.period > SILENCE_MOST)) { /* then all has faded */
         start(mitigation, sample);
     } else if (sample->advances) {
         advance(mitigation, settings, sample);

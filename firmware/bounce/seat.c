@@ -3,12 +3,12 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define LONGEST 0.02f /* step [s] */
+#define SEAT_STEP_MOST 0.02f /* step [s] */
 
 float seat_bent(seat_t *seat, float z_ddot, float elapsed)
 {
     const lever_aircraft_t *aircraft = seat->aircraft;
-    const bool goes_on = (elapsed > 0.0f) && (elapsed <= LONGEST);
+    const bool goes_on = (elapsed > 0.0f) && (elapsed <= SEAT_STEP_MOST);
     const float half = 0.5f * elapsed;
     const float middle = 0.5f * (seat->z_ddot + z_ddot);
     float at_seat = aircraft->seat_direct * z_ddot;

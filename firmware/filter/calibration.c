@@ -3,9 +3,9 @@
 #include <math.h>
 #include <string.h>
 
-#define MEMORY 20.0f /* [s] */
-#define STATED 2.0f  /* an error may be so many standard deviations of what is stated, */
-#define NOISE 4.0f   /* and so many of those of the innovations [rough] */
+#define CALIBRATION_MEMORY 20.0f /* [s] */
+#define STATED 2.0f              /* an error may be so many standard deviations of what is stated, */
+#define NOISE 4.0f               /* and so many of those of the innovations [rough] */
 
 void calibration_start(calibration_t *calibration)
 {
@@ -14,7 +14,7 @@ void calibration_start(calibration_t *calibration)
 
 float calibration_step(calibration_t *calibration, const cdkf_t *cdkf, float period)
 {
-    const float keep = 1.0f - (period / MEMORY);
+    const float keep = 1.0f - (period / CALIBRATION_MEMORY);
     float largest = 0.0f;
     for (uint32_t c = 0u; c < (uint32_t)CDKF_CALIBRATION; c++) {
         const score_t score = cdkf_constant_score(cdkf, c);

@@ -128,7 +128,7 @@ void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bo
     innovation[1].value -= coupling * innovation[0].value;
     innovation[1].response -= coupling * innovation[0].response;
     innovation[1].inverse_variance = (variance > 1.0f) ? (1.0f / variance) : 1.0f; /* it is at least 1 */
-    INVARIANT(factor_is_lower(cdkf->s_xx, N) && !((cdkf->s_xx[0] < 0.0f) || (cdkf->s_xx[3] < 0.0f)));
+    INVARIANT(factor_is_whole(cdkf->s_xx, N));
 }
 
 float cdkf_output_variance(const cdkf_t *cdkf, uint32_t i)

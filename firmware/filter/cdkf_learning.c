@@ -127,7 +127,7 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
         correction->variance[i] -= factor_variance(cdkf->s, L, i);
         correction->w[i] = cdkf->w[i] - correction->w[i];
     }
-    INVARIANT(factor_is_lower(cdkf->s, L) && !((cdkf->s[0] < 0.0f) || (cdkf->s[4] < 0.0f) || (cdkf->s[8] < 0.0f)));
+    INVARIANT(factor_is_whole(cdkf->s, L));
 }
 
 #define STEP_SIGMA 100.0f /* [rad/s^2]: a lever that rests 10 degrees from where it was */

@@ -1,14 +1,13 @@
 #include "filter/derived.h"
 
 #include "math/factor.h"
+#include "math/trigonometry.h"
 #include "model/base_motion.h"
 
 #include <math.h>
 
-#define TURN 6.28318531f
-
-/* Of gain and of phase, where a trunk on a seat is part of the model: what its filter is off by with seat settings that
- * are 10 % off. */
+/* Of gain and of phase [1], [rad^2], where a trunk on a seat is part of the model: what its filter is off by with seat
+ * settings that are 10 % off. */
 #define SEAT_VARIANCE 1.6e-3f
 
 /* Standard deviations of two quantities, and the covariance of their errors. */

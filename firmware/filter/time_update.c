@@ -110,5 +110,5 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
     if (taken) {
         grip_take(cdkf, grip, &seen);
     }
-    INVARIANT(factor_is_lower(cdkf->s_xx, MODEL_STATES) && !((cdkf->s_xx[0] < 0.0f) || (cdkf->s_xx[3] < 0.0f)));
+    INVARIANT(factor_is_whole(cdkf->s_xx, MODEL_STATES));
 }

@@ -1,13 +1,14 @@
 #include "filter/trim.h"
 
 #include "math/bounds.h"
+#include "math/trigonometry.h"
 
 #include <math.h>
 #include <string.h>
 
 #define SECTIONS ((uint32_t)TRIM_SECTIONS)
-#define SETTLING_TURNS 0.9f /* of the corner */
-#define STEPS_MOST 24.0f    /* of that line */
+#define SETTLING_TURNS 0.9f   /* of the corner */
+#define LINE_STEPS_MOST 24.0f /* of that line */
 
 /* The sections in units of the corner: 2 cos(pi / 12), 2 cos(3 pi / 12), 2 cos(5 pi / 12). */
 static const float damping[TRIM_SECTIONS] = {1.93185165f, 1.41421356f, 0.517638090f};
@@ -25,7 +26,7 @@ float trim_angle(const trim_t *trim)
 void trim_start(trim_t *trim, float angle, float corner, bool deviations)
 {
     (void)memset(trim, 0, sizeof *trim);
-    trim->corner = HIGH_PASS_TURN * corner;
+    trim->corner = TURN * corner;
     trim->deviations = deviations;
     trim->output[0].section[0].level = angle;
     trim->last[0] = angle;
@@ -58,9 +59,16 @@ void trim_begin(trim_t *trim, const float x[MODEL_STATES])
     trim_set_origin(trim);
 }
 
+void trim_shift(trim_t *trim, float offset)
+{
+    trim->output[0].section[0].level += offset;
+    trim->last[0] += offset;
+    trim_set_origin(trim);
+}
+
 float trim_settling_time(const trim_t *trim)
 {
-    return (SETTLING_TURNS * HIGH_PASS_TURN) / trim->corner;
+    return (SETTLING_TURNS * TURN) / trim->corner;
 }
 
 void trim_unsettle(trim_t *trim)
@@ -103,7 +111,7 @@ static float pass_line(trim_t *trim, uint32_t i, float value, float period)
 {
     const float elapsed = trim->missing[i] + period;
     const float whole = (elapsed / period) + 0.5f;
-    const uint32_t steps = (uint32_t)lesser(whole, STEPS_MOST);
+    const uint32_t steps = (uint32_t)lesser(whole, LINE_STEPS_MOST);
     const float part = 1.0f / (float)steps;
     const float turn = trim->corner * (part * elapsed);
     float deviation = 0.0f;

@@ -26,7 +26,6 @@ typedef struct high_pass {
     float slope; /* [unit corner] */
 } high_pass_t;
 
-#define HIGH_PASS_TURN 6.28318531f        /* [rad] */
 #define HIGH_PASS_BUTTERWORTH 1.41421356f /* damping, twice the damping ratio, of one section alone */
 
 /* One value; `turn`: the corner [rad/s] times the time since the last one. Returns its deviation from the level before
@@ -75,6 +74,9 @@ void trim_start(trim_t *trim, float angle, float corner, bool deviations);
 /* The levels begin anew where the signals are, `x` from the last origin, as if nothing had been before: not even a rate,
  * so that theta moves by begin_rate besides, as far as the step of 1 has not passed away. */
 void trim_begin(trim_t *trim, const float x[MODEL_STATES]);
+
+/* From now on theta has `offset` more [rad], in preload trim. */
+void trim_shift(trim_t *trim, float offset);
 
 /* The trim angle [rad]. */
 float trim_angle(const trim_t *trim);

@@ -8,8 +8,8 @@
 #include <string.h>
 
 #define LAGS ((uint32_t)WHITENESS_LAGS)
-#define MEMORY 5.0f   /* of the means [s]: 250 blocks of 20 ms, white correlations are then 0.05 */
-#define TIME_MIN 2.0f /* before a verdict [s] */
+#define WHITENESS_MEMORY 5.0f /* of the means [s]: 250 blocks of 20 ms, white correlations are then 0.05 */
+#define WHITENESS_MIN 2.0f    /* before a verdict [s] */
 
 void whiteness_start(whiteness_t *whiteness)
 {
@@ -22,13 +22,13 @@ float whiteness_correlation(const whiteness_t *whiteness)
     for (uint32_t k = 0u; k < LAGS; k++) {
         largest = greater(fabsf(whiteness->product[k]), largest);
     }
-    return (whiteness->time >= TIME_MIN) ? (largest / greater(whiteness->variance, whiteness->expected)) : 0.0f;
+    return (whiteness->time >= WHITENESS_MIN) ? (largest / greater(whiteness->variance, whiteness->expected)) : 0.0f;
 }
 
 void whiteness_end_block(whiteness_t *whiteness)
 {
     const float sum = whiteness->sum;
-    whiteness->time = lesser(whiteness->time + whiteness->elapsed, MEMORY);
+    whiteness->time = lesser(whiteness->time + whiteness->elapsed, WHITENESS_MEMORY);
     const float share = whiteness->elapsed / whiteness->time;
     whiteness->variance += share * ((sum * sum) - whiteness->variance);
     whiteness->expected += share * (whiteness->count - whiteness->expected);

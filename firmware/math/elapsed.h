@@ -6,6 +6,9 @@
 
 #include <stdint.h>
 
+/* Of two times that may wrap, the one that is less than this after the other is the later [us]. */
+#define HALF_TURN_OF_TIME 0x80000000u
+
 /* The nearest number of microseconds. */
 static inline uint32_t microseconds_of(float seconds)
 {

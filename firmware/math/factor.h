@@ -16,16 +16,17 @@
 
 enum { FACTOR_ROWS_MOST = 8 }; /* of factor_add_noise */
 
-/* Whether it is lower-triangular. */
-static inline bool factor_is_lower(const float *s, uint32_t n)
+/* Whether it is lower-triangular, and no element of its diagonal negative: invariants. NaN breaks none. */
+static inline bool factor_is_whole(const float *s, uint32_t n)
 {
-    bool lower = true;
+    bool whole = true;
     for (uint32_t i = 0u; i < n; i++) {
+        whole = whole && !(s[(i * n) + i] < 0.0f);
         for (uint32_t j = i + 1u; j < n; j++) {
-            lower = lower && !(fabsf(s[(i * n) + j]) > 0.0f);
+            whole = whole && !(fabsf(s[(i * n) + j]) > 0.0f);
         }
     }
-    return lower;
+    return whole;
 }
 
 static inline float factor_dot_three(const float *a, const float *b)

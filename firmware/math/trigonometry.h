@@ -8,6 +8,8 @@
 #ifndef MATH_TRIGONOMETRY_H
 #define MATH_TRIGONOMETRY_H
 
+#define TURN 6.28318531f /* [rad] */
+
 typedef struct sine_cosine {
     float sine;
     float cosine;

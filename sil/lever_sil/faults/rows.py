@@ -393,21 +393,16 @@ _BASE = "without torque a gain of z̈ is a scale of the arm, which no innovation
 _LEVELS = "its levels are off by the whole angle when it is right again: BASE and INNOVATION go after up to 3.6 s"
 _RATE_ALONE = "learnt from the rate alone, some pilots' arm is off by over 3 sigma for 2 s after the angle is back"
 _CLOCK = "the firmware has no clock of its own; a rate that is off by less than an eighth is that of another arm"
-_TRIM = "f_n is that at the angle shown, which is off, and k_p that is held does not make up for it"
+_TRIM = "f_n is that at the angle shown, which drifts off, and k_p that is held does not make up for it"
 KNOWN: dict[str, str] = {
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",
     "theta_zero": _LEVELS,
     "theta_sign": _LEVELS,
-    "theta_gain_half": _LEVELS,
     "theta_gain_double": _LEVELS,
     "theta_gain_drift": _DRIFT,
-    "theta_step": _OFFSET,
-    "theta_drift": _OFFSET,
     "theta_invalid_from_power_on": _RATE_ALONE,
     "theta_saturated_from_power_on": _RATE_ALONE,
-    "theta_step_frozen": _TRIM,
     "theta_drift_frozen": _TRIM,
-    "theta_dot_step": _OFFSET,
     "theta_dot_gain_double": _LEVELS,
     "tau_m_stuck": _TORQUE,
     "tau_m_zero": _TORQUE,

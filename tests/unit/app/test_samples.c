@@ -1,5 +1,6 @@
 /* Single samples: what is missing, invalid, implausible, late, twice; time that wraps or starts anew. */
 #include "app/instance.h"
+#include "math/bounds.h"
 #include "model/model.h"
 #include "rig.h"
 
@@ -290,6 +291,65 @@ TEST(a_delay_between_two_samples_is_on_the_line_between_them)
         (void)lever_update(lever, &sample);
     }
     TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, 0.1f * (99.0f - 0.75f), lever->estimator.last_z_ddot);
+}
+
+/* Into both, the angle of the one off by `offset`. Returns the faults that it shows at any time. */
+static uint32_t run_off(uint32_t count, float offset)
+{
+    uint32_t faults = 0u;
+    for (uint32_t k = 0u; k < count; k++) {
+        lever_sample_t sample = sample_after(1u);
+        (void)lever_update(other, &sample);
+        sample.theta += offset;
+        (void)lever_update(lever, &sample);
+        faults |= health().faults;
+    }
+    return faults;
+}
+
+/* An angle that jumps while the rate goes on has another offset: that teaches nothing. While the parameters are held they
+ * do not belong to the angle shown, until it is back. */
+/* R33 */
+TEST(an_angle_that_jumps_without_the_rate_has_another_offset)
+{
+    const uint32_t wrong = (uint32_t)LEVER_FAULT_INNOVATION | (uint32_t)LEVER_FAULT_CHANGE |
+                           (uint32_t)LEVER_FAULT_MISMATCH | (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_SETTLING;
+    run_both(8000u);
+    for (uint32_t frozen = 0u; frozen <= 1u; frozen++) {
+        const lever_command_t command = {
+            .request = (uint8_t)((frozen != 0u) ? LEVER_REQUEST_FREEZE : LEVER_REQUEST_RUN),
+            .model = (uint8_t)LEVER_KEEP,
+            .preload = (uint8_t)LEVER_KEEP,
+            .estimator = (uint8_t)LEVER_KEEP,
+            .adaptation = (uint8_t)LEVER_KEEP,
+            .mitigation = (uint8_t)LEVER_KEEP};
+        TEST_ASSERT_TRUE(lever_command(lever, &command) && lever_command(other, &command));
+        const uint32_t at_first = run_off(40u, 0.1f);
+        const uint32_t then = run_off(2000u, 0.1f);
+        TEST_ASSERT_EQUAL_UINT32((uint32_t)LEVER_FAULT_THETA, at_first & (wrong | (uint32_t)LEVER_FAULT_THETA));
+        TEST_ASSERT_EQUAL_UINT32(0u, then & wrong);
+        TEST_ASSERT_EQUAL(frozen != 0u, has_fault(LEVER_FAULT_THETA));
+        TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.1f, estimate().theta - estimate_of(other).theta);
+        TEST_ASSERT_EQUAL_UINT32(0u, run_off(2000u, 0.0f) & wrong);
+        TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_THETA));
+        TEST_ASSERT_FLOAT_WITHIN(0.01f * estimate_of(other).natural_frequency, estimate_of(other).natural_frequency,
+            estimate().natural_frequency);
+    }
+}
+
+/* The pilot moves the lever as fast: rate and angle agree, whatever the filter expected, and no offset is taken. */
+TEST(an_angle_that_the_rate_explains_has_no_other_offset)
+{
+    run_both(8000u);
+    for (uint32_t k = 0u; k < 400u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        const float moved = lesser(1.0e-3f * (float)k, 0.1f); /* at 1 rad/s */
+        sample.theta += moved;
+        sample.theta_dot += (k < 100u) ? 1.0f : 0.0f;
+        (void)lever_update(lever, &sample);
+        TEST_ASSERT_FALSE(evidence_has(&lever->estimator.learning.evidence, EVIDENCE_OFFSET));
+        TEST_ASSERT_EQUAL_FLOAT(0.0f, lever->estimator.learning.evidence.offset);
+    }
 }
 
 /* Half of the torque samples are missing. Where somebody else has driven the motor, the torque is then not known, and nothing is

@@ -6,7 +6,7 @@
 
 #include "test.h"
 
-#define TURN 6.283185307179586
+#define FULL_TURN 6.283185307179586
 #define PERIOD 1.0e-3 /* [s] */
 #define CORNER 0.2    /* [Hz] */
 #define IMAGINARY ((double complex)I)
@@ -26,14 +26,14 @@ void setUp(void)
 /* What is left of a sine behind the high-pass of the arm, and that of the base's velocity. */
 static double complex high_pass(double complex s)
 {
-    const double corner = TURN * CORNER;
+    const double corner = FULL_TURN * CORNER;
     const double complex first = sqrt(2.0) * corner * s;
     return ((s * s) + first) / ((s * s) + first + (corner * corner));
 }
 
 static double complex high_pass_of_velocity(double complex s)
 {
-    const double corner = TURN * CORNER;
+    const double corner = FULL_TURN * CORNER;
     return (s * s) / ((s * s) + (sqrt(2.0) * corner * s) + (corner * corner));
 }
 
@@ -43,7 +43,7 @@ static double complex response_of(
 {
     double complex sum = 0.0;
     for (uint32_t k = 0u; k < 15000u; k++) {
-        const double phase = TURN * frequency * PERIOD;
+        const double phase = FULL_TURN * frequency * PERIOD;
         model_step_t step = about;
         step.z_ddot = by_torque ? 0.0f : (float)sin(phase * (double)k);
         step.tau_m = by_torque ? (float)sin(phase * ((double)k - 0.5)) : 0.0f; /* held since the last sample */
@@ -65,7 +65,7 @@ static const double frequencies[] = {1.0, 2.0, 3.0, 4.0, 6.0, 8.0};
 
 TEST_EACH(6, of_a_base_that_moves_it_is_the_response_of_the_arm)
 {
-    const double complex s = IMAGINARY * TURN * frequencies[test_round];
+    const double complex s = IMAGINARY * FULL_TURN * frequencies[test_round];
     const double complex expected =
         (double)arm.forcing / ((s * s) + ((double)arm.damping * s) + (double)arm.stiffness) * high_pass(s);
     assert_response(expected, response_of(&arm, &lever, frequencies[test_round], false, 0.0f));
@@ -77,7 +77,7 @@ TEST_EACH(6, of_a_base_that_moves_it_is_the_response_of_the_arm)
 TEST_EACH(5, of_bounce_it_takes_all)
 {
     const double frequency = frequencies[1u + test_round];
-    const double complex s = IMAGINARY * TURN * frequency;
+    const double complex s = IMAGINARY * FULL_TURN * frequency;
     const double complex expected = (double)arm.forcing / ((s * s) + ((double)arm.damping * s) + (double)arm.stiffness);
     const double complex found = response_of(&arm, &lever, frequency, false, 0.0f);
     TEST_ASSERT_DOUBLE_WITHIN(0.012 * cabs(expected), 0.0, cabs(found - expected));
@@ -85,7 +85,7 @@ TEST_EACH(5, of_bounce_it_takes_all)
 
 TEST_EACH(6, of_a_motor_it_is_the_response_of_the_arm)
 {
-    const double complex s = IMAGINARY * TURN * frequencies[test_round];
+    const double complex s = IMAGINARY * FULL_TURN * frequencies[test_round];
     const double complex expected = (double)arm.torque / ((s * s) + ((double)arm.damping * s) + (double)arm.stiffness);
     assert_response(expected, response_of(&arm, &lever, frequencies[test_round], true, 0.0f));
 }
@@ -96,7 +96,7 @@ TEST_EACH(6, of_a_hand_that_is_damped_in_space_it_has_the_zero)
     model_dynamics_t hand = arm;
     hand.forcing = -1.0f / (0.45f * 0.940f);
     hand.space = 8.5f;
-    const double complex s = IMAGINARY * TURN * frequencies[test_round];
+    const double complex s = IMAGINARY * FULL_TURN * frequencies[test_round];
     const double complex drive = high_pass(s) + ((double)hand.space / s * high_pass_of_velocity(s));
     const double complex expected =
         (double)hand.forcing * drive / ((s * s) + ((double)hand.damping * s) + (double)hand.stiffness);
@@ -112,7 +112,7 @@ TEST_EACH(6, of_a_trunk_on_its_seat_it_has_its_resonance)
     on_seat.arm_damping = 5.5f;
     seated.seat_stiffness = 800.0f;
     seated.seat_damping = 22.0f;
-    const double complex s = IMAGINARY * TURN * frequencies[test_round];
+    const double complex s = IMAGINARY * FULL_TURN * frequencies[test_round];
     const double complex seat =
         -(1.0 / (0.45 * 0.940)) / ((s * s) + ((double)seated.seat_damping * s) + (double)seated.seat_stiffness);
     const double complex by_seat = ((double)on_seat.arm_stiffness + ((double)on_seat.arm_damping * s)) * seat;
@@ -156,11 +156,11 @@ TEST(it_goes_on_through_gaps)
     for (uint32_t k = 0u; k < 2000u; k++) {
         model_step_t step = about;
         step.period = (k == 1000u) ? 0.1f : 5.0e-3f;
-        step.z_ddot = (float)sin(TURN * 3.0 * 5.0e-3 * (double)k);
+        step.z_ddot = (float)sin(FULL_TURN * 3.0 * 5.0e-3 * (double)k);
         TEST_ASSERT_TRUE(involuntary_step(&motion, &arm, &lever, &step, (float)CORNER));
         greatest = fmax(greatest, fabs((double)motion.theta));
     }
-    const double complex s = IMAGINARY * TURN * 3.0;
+    const double complex s = IMAGINARY * FULL_TURN * 3.0;
     const double expected = cabs((double)arm.forcing / ((s * s) + ((double)arm.damping * s) + (double)arm.stiffness));
     TEST_ASSERT_TRUE(greatest < (2.0 * expected));
 }

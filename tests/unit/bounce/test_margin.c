@@ -8,7 +8,7 @@
 
 #include "test.h"
 
-#define TURN 6.283185307179586
+#define FULL_TURN 6.283185307179586
 #define IMAGINARY ((double complex)I)
 #define TRIM 0.34906585
 #define FINE 1000u
@@ -52,9 +52,9 @@ static double complex arm_at(double frequency)
     const lever_settings_t *s = &config.settings;
     const double rise = (double)s->lever_length * cos(TRIM);
     const double inertia = 0.020 + (0.225 * 0.225 * 1.2) + (0.45 * 0.45 * (double)s->m_p);
-    const double complex at = IMAGINARY * TURN * frequency;
+    const double complex at = IMAGINARY * FULL_TURN * frequency;
     const double complex held = rise * rise * ((double)s->k_p + (at * (double)s->c_p)) / inertia;
-    const double seat = TURN * (double)s->seat_frequency;
+    const double seat = FULL_TURN * (double)s->seat_frequency;
     const double complex trunk = (at * at) + (2.0 * (double)s->seat_damping_ratio * seat * at) + (seat * seat);
     const double complex by_seat = (seat > 0.0) ? (held / (rise * trunk)) : 0.0;
     const double complex drive = -(rise * (0.6 + (double)s->m_p) / inertia) - by_seat;

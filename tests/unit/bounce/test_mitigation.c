@@ -6,7 +6,7 @@
 
 #include "test.h"
 
-#define TURN 6.283185307179586
+#define FULL_TURN 6.283185307179586
 #define PERIOD_US 1000u
 #define SILENCE_US 20000u
 #define JUMP 3.5e-3f  /* 0.2 degrees [rad] */
@@ -62,9 +62,9 @@ static lever_correction_t now(void)
 static void move(void)
 {
     const double period = 1.0e-6 * (double)PERIOD_US;
-    const double before = shaking * sin(TURN * frequency * seconds);
+    const double before = shaking * sin(FULL_TURN * frequency * seconds);
     seconds += period;
-    const double z_ddot = shaking * sin(TURN * frequency * seconds);
+    const double z_ddot = shaking * sin(FULL_TURN * frequency * seconds);
     const double torque = (double)sample.drive * (double)mitigation.damping;
     const double middle = moved[0] + (0.5 * period * moved[1]);
     const double acceleration = ((double)arm.forcing * 0.5 * (before + z_ddot)) + ((double)arm.torque * torque) -
@@ -72,7 +72,7 @@ static void move(void)
     const double change = period * acceleration / (1.0 + (0.5 * period * (double)arm.damping));
     moved[0] += period * (moved[1] + (0.5 * change));
     moved[1] += change;
-    const double turn = TURN * purpose_frequency;
+    const double turn = FULL_TURN * purpose_frequency;
     sample.theta = (float)(0.35 + (likeness * moved[0]) + (purpose * sin(turn * seconds)));
     sample.theta_dot = (float)((likeness * moved[1]) + (purpose * turn * cos(turn * seconds)));
     sample.step.z_ddot = (float)z_ddot;
@@ -337,14 +337,16 @@ TEST(what_the_arm_does_not_explain_is_notched)
 {
     for (uint32_t i = 0u; i < 5000u; i++) {
         move();
-        sample.theta = 0.35f + (0.01f * (float)sin(TURN * 3.0 * seconds)) + (0.005f * (float)sin(TURN * 6.5 * seconds));
+        sample.theta =
+            0.35f + (0.01f * (float)sin(FULL_TURN * 3.0 * seconds)) + (0.005f * (float)sin(FULL_TURN * 6.5 * seconds));
         sample.fits = false;
         on = mitigation_step(&mitigation, &config.settings, &sample);
     }
     double corrected = 0.0;
     for (uint32_t i = 0u; i < 4000u; i++) {
         move();
-        sample.theta = 0.35f + (0.01f * (float)sin(TURN * 3.0 * seconds)) + (0.005f * (float)sin(TURN * 6.5 * seconds));
+        sample.theta =
+            0.35f + (0.01f * (float)sin(FULL_TURN * 3.0 * seconds)) + (0.005f * (float)sin(FULL_TURN * 6.5 * seconds));
         on = mitigation_step(&mitigation, &config.settings, &sample);
         const double left = ((double)sample.theta - 0.35) + (double)now().angle;
         corrected += left * left;
@@ -448,7 +450,7 @@ static void torque_at(double at, double *along, double *across)
     *across = 0.0;
     for (uint32_t k = 0u; k < 4000u; k++) {
         run(1u);
-        const double turn = TURN * at;
+        const double turn = FULL_TURN * at;
         *along += 5.0e-4 * (double)mitigation.damping * cos(turn * seconds) / (purpose * turn);
         *across += 5.0e-4 * (double)mitigation.damping * sin(turn * seconds) / (purpose * turn);
     }
@@ -496,8 +498,8 @@ static void notch_at(double at, double *gain, double *phase)
     for (uint32_t k = 0u; k < 4000u; k++) {
         run(1u);
         const double angle = ((double)sample.theta - 0.35 + (double)now().angle) / purpose;
-        along += 5.0e-4 * angle * sin(TURN * at * seconds);
-        across += 5.0e-4 * angle * cos(TURN * at * seconds);
+        along += 5.0e-4 * angle * sin(FULL_TURN * at * seconds);
+        across += 5.0e-4 * angle * cos(FULL_TURN * at * seconds);
     }
     *gain = hypot(along, across);
     *phase = atan2(across, along);

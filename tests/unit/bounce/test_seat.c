@@ -6,7 +6,7 @@
 
 #include "test.h"
 
-#define TURN 6.283185307179586
+#define FULL_TURN 6.283185307179586
 #define PERIOD 1.0e-3
 
 /* 1 + 0.3 s^2 / (s^2 + 2.262 s + 1421) of a mode at 6 Hz, and a slower one. */
@@ -18,7 +18,7 @@ static const lever_aircraft_t bent = {.seat_modes = 2u,
 /* Real and imaginary part of the response at a frequency [Hz], after it has settled. */
 static void respond(seat_t *seat, double frequency, double found[2])
 {
-    const double turn = TURN * frequency;
+    const double turn = FULL_TURN * frequency;
     found[0] = 0.0;
     found[1] = 0.0;
     for (uint32_t k = 0u; k < 30000u; k++) {
@@ -33,7 +33,7 @@ static void respond(seat_t *seat, double frequency, double found[2])
 
 static void expect(double frequency, double expected[2])
 {
-    const double w = TURN * frequency;
+    const double w = FULL_TURN * frequency;
     expected[0] = (double)bent.seat_direct;
     expected[1] = 0.0;
     for (uint32_t i = 0u; i < bent.seat_modes; i++) {

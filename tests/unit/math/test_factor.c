@@ -210,16 +210,16 @@ TEST(a_pivot_is_kept_above_the_rounding_of_its_information)
 }
 
 /* What is not a number is no evidence. */
-TEST(a_factor_has_nothing_above_its_diagonal)
+TEST(a_factor_has_nothing_above_its_diagonal_and_nothing_negative_on_it)
 {
     const float lower[9] = {1.0f, 0.0f, 0.0f, -2.0f, 0.0f, 0.0f, 3.0f, -4.0f, NAN};
-    TEST_ASSERT_TRUE(factor_is_lower(lower, 3u));
+    TEST_ASSERT_TRUE(factor_is_whole(lower, 3u));
     for (uint32_t k = 0u; k < 9u; k++) {
         const uint32_t row = k / 3u;
         const uint32_t column = k % 3u;
         float changed[9];
         (void)memcpy(changed, lower, sizeof changed);
         changed[k] = -1.0f;
-        TEST_ASSERT_EQUAL(column <= row, factor_is_lower(changed, 3u));
+        TEST_ASSERT_EQUAL(column < row, factor_is_whole(changed, 3u));
     }
 }
