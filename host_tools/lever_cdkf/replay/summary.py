@@ -148,7 +148,8 @@ def _troubles(summary: ReplaySummary) -> list[str]:
         troubles.append(f"{recording.damaged_lines} of its lines are not frames.")
     if recording.gaps:
         gaps, longest = recording.gaps, recording.longest_gap_s
-        troubles.append(f"Samples are missing in {gaps} places, the longest gap {longest:.3g} s.")
+        where = f"{gaps} places, the longest gap" if gaps > 1 else "one place, a gap of"
+        troubles.append(f"Samples are missing in {where} {longest:.3g} s.")
     if recording.clock_restarts:
         troubles.append(f"The sender's clock started over {recording.clock_restarts} times.")
     if recording.model_changes:

@@ -165,6 +165,8 @@ def _beginning(columns: Sequence[Signal]) -> float:
 def _check_there(path: str) -> None:
     if path != "-" and not Path(path).exists():
         raise LeverError(f"cannot read {path}: no such file")
+    if Path(path).is_dir():
+        raise LeverError(f"cannot read {path}: it is a folder: name a file in it")
 
 
 def _collect(

@@ -153,9 +153,15 @@ def _header(lines: list[str], delimiter: str, first: int, path: str) -> tuple[li
     """Return names and units of the columns. Raise LeverError."""
     width = len(_fields(lines[first], delimiter))
     above = [_fields(line.lstrip("#% "), delimiter) for line in lines[:first]]
-    above = [row for row in above if len(row) == width]
-    if not above:
+    named = [row for row in above if len(row) == width]
+    if not named and above and len(above[-1]) > 1:
+        raise LeverError(
+            f"{path}: line {first} has {len(above[-1])} names, and the line below it {width} numbers: "
+            "each column needs both"
+        )
+    if not named:
         raise LeverError(f"{path}: its columns have no names: put a line with a name for each above the numbers")
+    above = named
     labels, units = above[-1], [""] * width
     if len(above) > 1 and sum(is_unit(normal(each.strip("[]()"))) for each in above[-1]) >= width / 2:
         labels, units = above[-2], [each.strip("[]() ") for each in above[-1]]

@@ -170,7 +170,7 @@ def test_gaps_and_restarts_are_told(session: Session, tmp_path: Path) -> None:
     assert summary["recording"]["gaps"] == 1
     assert summary["recording"]["longest_gap_s"] == pytest.approx(0.701)
     assert summary["samples"] == 6000 - 700
-    assert "the longest gap 0.701 s" in summary["verdict"]
+    assert "in one place, a gap of 0.701 s" in summary["verdict"]
     twice = tmp_path / "twice.log"
     shifted = [f"({float(line[1 : line.index(')')]) + 60.0:.6f}){line[line.index(')') + 1 :]}" for line in lines]
     twice.write_text("".join(f"{line}\n" for line in [*lines, *shifted]))

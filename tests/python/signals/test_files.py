@@ -170,6 +170,7 @@ def test_every_kind_of_csv(kind: str, packed: bool, columns: Columns, tmp_path: 
     [
         ("empty.csv", b"", "no table of numbers"),
         ("bare.csv", b"0.0,1.0\n0.1,2.0\n0.2,3.0\n", "its columns have no names"),
+        ("uneven.csv", b"time,a,b\n" + b"0.5,1.0\n" * 9, "line 1 has 3 names, and the line below it 2 numbers"),
         ("prose.csv", b"once upon\na time\n", "no table of numbers"),
         ("prose.txt", b"once upon\na time\n", "add --dbc FILE"),
         ("timeless.csv", b"a,b\n" + b"1.5,2\n" * 9, "say which by --map time=COLUMN"),
@@ -184,6 +185,10 @@ def test_what_is_no_table(name: str, content: bytes, said: str, tmp_path: Path, 
     (tmp_path / name).write_bytes(content)
     assert said in refused("replay", tmp_path / name, "--map", "theta=a", "z_ddot=b", "-o", tmp_path / "out")
     assert not list(tmp_path.glob("out/*"))
+
+
+def test_a_folder_is_no_log(tmp_path: Path, refused: Refused) -> None:
+    assert "it is a folder" in refused("replay", tmp_path, "--map", "theta=a", "z_ddot=b", "-o", tmp_path / "out")
 
 
 def as_csv(columns: Columns, path: Path, encoding: str = "utf-8", decimal: str = ".") -> None:
