@@ -27,7 +27,7 @@ MAY_IMPORT = {
     "lever_cdkf/board": set(),
     "lever_cdkf/can": {"firmware"},
     "lever_cdkf/results": {"firmware"},
-    "lever_cdkf/report": {"firmware", "models", "results"},
+    "lever_cdkf/report": {"cli", "firmware", "models", "results"},
     "lever_cdkf/signals": {"firmware", "can", "results", "exports"},
     "lever_cdkf/exports": {"cli", "firmware", "can", "results"},
     "lever_cdkf/replay": {"cli", "firmware", "can", "results", "report", "signals", "exports"},
@@ -60,7 +60,7 @@ MAY_IMPORT = {
         *("acceptance", "batch", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
         *("firmware", "models", "report"),
     },
-    "lever_sil/faults": {"cli", "batch", "fast", "envelope", "firmware", "can", "report"},
+    "lever_sil/faults": {"acceptance", "cli", "batch", "fast", "envelope", "firmware", "can", "report"},
     "lever_sil/soak": {"cli", "fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
     "lever_sil/study": {
         *("cli", "run", "fast", "scenarios", "plants", "batch", "envelope"),

@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from ..cli.tables import Row
 from ..firmware import native
 from ..firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
 from ..results import trust
@@ -147,6 +148,12 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     body = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
     top = f"<thead><tr>{head}</tr></thead>" if any(header) else ""
     return f'<div class="scroll"><table>{top}<tbody>{body}</tbody></table></div>'
+
+
+def rows_table(rows: Sequence[Row], digits: int = 4) -> str:
+    """Return rows as commands print them, numbers with so many digits; nothing without rows."""
+    cells = ([html.escape(number(cell, digits)) for cell in row.values()] for row in rows)
+    return table([html.escape(column) for column in rows[0]], cells) if rows else ""
 
 
 def errors_table(run: Run) -> str:

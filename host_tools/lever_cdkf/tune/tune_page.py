@@ -10,7 +10,7 @@ import numpy as np
 from ..cli.tables import Row
 from ..report.figure import Figure, Spec, axis, band, dots, line
 from ..report.page import Page
-from ..report.summary_html import number, table
+from ..report.summary_html import rows_table
 from ..results.whiteness import CANNOT_SEE
 from .search import Tuned
 from .validation import Fit
@@ -49,8 +49,7 @@ def build(
 
 
 def _table(title: str, rows: Sequence[Row]) -> str:
-    cells = ([html.escape(number(cell, 4)) for cell in row.values()] for row in rows)
-    return f"<h3>{html.escape(title)}</h3>{table([html.escape(column) for column in rows[0]], cells)}" if rows else ""
+    return f"<h3>{html.escape(title)}</h3>{rows_table(rows)}" if rows else ""
 
 
 def _intervals(tuned: Sequence[Tuned]) -> Figure | None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from lever_cdkf.cli.tables import Row
 from lever_cdkf.report.page import Page
-from lever_cdkf.report.summary_html import table
+from lever_cdkf.report.summary_html import rows_table
 
 from ..study.figures import maps as drawn
 from ..study.figures.maps import MapFigure
@@ -26,8 +26,8 @@ def build(
     for figure in figures:
         chart = page.figure(f"{figure.name}-chart", drawn.spec(figure), html.escape(figure.caption))
         page.section(figure.name, figure.title, figure.title, chart)
-    page.section("border", "Border", "Where tracking fails", _table(border))
-    page.section("estimators", "Estimators", "All runs of each estimator", _table(by_estimator))
+    page.section("border", "Border", "Where tracking fails", rows_table(border))
+    page.section("estimators", "Estimators", "All runs of each estimator", rows_table(by_estimator))
     return page.html(f'<p class="verdict">{_verdict(cells, spec.failure)}</p>')
 
 
@@ -46,8 +46,3 @@ def _verdict(cells: Map, failure: Failure) -> str:
         f"Of {count} cells tracking holds with {names}. It counts as failed where the median error is above "
         f"{100.0 * failure.error:g} % or the coverage below {100.0 * failure.coverage:g} %."
     )
-
-
-def _table(rows: Sequence[Row]) -> str:
-    header = [html.escape(column) for column in rows[0]] if rows else []
-    return table(header, ([html.escape("" if cell is None else str(cell)) for cell in row.values()] for row in rows))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .. import measures
 from ..acceptance import result as acceptance
+from ..acceptance.excerpt import Excerpt
 from ..acceptance.result import Values, largest, mean
 from ..batch.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from ..batch.motions import Recording
@@ -294,19 +295,6 @@ def _figures() -> dict[str, Figure]:
     }
 
 
-@dataclass(frozen=True)
-class Excerpt:
-    """The natural frequency in the run in which it was worst, for a chart: columns at a few hundred times."""
-
-    time: FloatArray
-    """[s]"""
-    truth: FloatArray
-    """[Hz]; nothing for a pilot that has none."""
-    value: FloatArray
-    sigma: FloatArray
-    flagged: BoolArray
-
-
 def excerpt(outcome: Outcome, points: int = 600) -> Excerpt:
     """Return the part of an outcome that a reader gets to see."""
     truth, run = outcome.recording.truth.get("f_n"), 0
@@ -315,6 +303,7 @@ def excerpt(outcome: Outcome, points: int = 600) -> Excerpt:
     track = outcome.track
     at = np.arange(0, len(track.time), max(1, len(track.time) // points))
     return Excerpt(
+        quantity="f_n",
         time=track.time[at],
         truth=np.empty(0) if truth is None else truth[at, run],
         value=track.value["f_n"][at, run],

@@ -10,13 +10,14 @@ import numpy as np
 from lever_cdkf.errors import SettingsError
 from lever_cdkf.firmware.config import Config
 
+from ..acceptance.excerpt import Excerpt
 from ..acceptance.result import ConditionResult
 from ..batch import firmware, pilots, plant
 from ..batch.firmware import ClosedLoop
 from ..batch.motions import Motion, Recording, lanes, truth
 from ..batch.sensors import measured
 from .condition import Condition
-from .measure import FIGURES, Excerpt, Outcome, excerpt
+from .measure import FIGURES, Outcome, excerpt
 
 LANE_SECONDS = 64 * 60.0
 """Of all runs that are simulated at a time, which bounds the memory."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 import html
 from collections.abc import Sequence
 
-import numpy as np
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST, fault_names
-from lever_cdkf.report.figure import Figure, axis, band, dots, line, time_axis
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table
 
 from ..measures import WRONG
-from .judge import BACK, ERROR, RIGHT, SILENT, Excerpt
+from .judge import BACK, ERROR, RIGHT, SILENT
 from .matrix import RowResult
 from .rows import KNOWN
 from .table import HOLDS, demands, lines, missed, state
@@ -25,8 +23,6 @@ _STYLE = """
 #table :is(td, th) { vertical-align: top; }
 #table td:nth-child(n+2):nth-child(-n+4) { min-width: 10rem; }
 """
-_NAMES = {"f_n": "natural frequency [Hz]", "zeta": "damping ratio", "m_p": "m_p [kg]", "c_p": "c_p [N s/m]",
-          "k_p": "k_p [N/m]"}  # fmt: skip
 
 
 def build(results: Sequence[RowResult], seeds: int) -> str:
@@ -84,26 +80,8 @@ def _section(page: Page, result: RowResult) -> None:
     """Why it is not met, and a chart."""
     name, shown = result.row.name, result.shown.excerpt
     why = f"<p>Known: {html.escape(KNOWN[name])}.</p>" if result.broken and name in KNOWN else ""
-    chart = page.figure(f"chart-{name}", None if shown is None else _chart(shown, result), "")
+    chart = page.figure(f"chart-{name}", None if shown is None else shown.chart(WRONG, result.row.time), "")
     page.section(name, name, f"{html.escape(result.row.title)}: {state(result)}", why, chart)
-
-
-def _chart(shown: Excerpt, result: RowResult) -> Figure:
-    """Return what was longest wrong, over time; dots at the foot where a flag says so."""
-    low, high = shown.value - WRONG * shown.sigma, shown.value + WRONG * shown.sigma
-    values = np.concatenate((shown.truth, shown.value[np.isfinite(shown.value)]))
-    floor, ceiling = 0.8 * float(np.percentile(values, 1.0)), 1.2 * float(np.percentile(values, 99.0))
-    figure = Figure(
-        [axis(_NAMES[shown.quantity], range=[floor, ceiling])], time_axis(float(shown.time[-1])), height=260
-    )
-    figure.add(*band(shown.time, low, high, f"estimate ±{WRONG:g}σ", "estimate-band"))
-    figure.add(line(shown.time, shown.truth, "truth", "truth", line_dash="dash", zorder=1))
-    figure.add(line(shown.time, shown.value, "estimate", "estimate"))
-    if shown.flagged.any():
-        at = shown.time[shown.flagged]
-        figure.add(dots(at, np.full(at.shape, floor + 0.02 * (ceiling - floor)), "flagged", "fault"))
-    figure.mark(list(result.row.time))
-    return figure
 
 
 def _legend() -> str:

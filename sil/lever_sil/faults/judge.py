@@ -12,6 +12,7 @@ from lever_cdkf.firmware.library import enum_names, lib
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 
 from .. import measures
+from ..acceptance.excerpt import Excerpt
 from ..batch.motions import PERIOD, STRIDE
 from ..envelope.measure import QUANTITIES, fault_mask
 from .bus import Interval
@@ -54,19 +55,6 @@ class Requirement:
     """That of the last sample in the fault."""
     torque_ends: float | None = None
     """Torque is zero from so long after its begin [s] to its end."""
-
-
-@dataclass(frozen=True)
-class Excerpt:
-    """One quantity of a flight, for a chart."""
-
-    quantity: str
-    time: FloatArray
-    """[s]"""
-    truth: FloatArray
-    value: FloatArray
-    sigma: FloatArray
-    flagged: BoolArray
 
 
 @dataclass

@@ -8,7 +8,7 @@ import numpy as np
 from lever_cdkf.cli.tables import Row
 from lever_cdkf.report.figure import SERIES, Figure, axis, line
 from lever_cdkf.report.page import Page
-from lever_cdkf.report.summary_html import table
+from lever_cdkf.report.summary_html import rows_table
 
 from .soak import QUANTITIES, SoakResult
 
@@ -26,13 +26,8 @@ def build(result: SoakResult, rows: list[Row], verdict: str) -> str:
     """Return the whole page; `rows` are the hours, as printed."""
     page = Page("A day without a reset", "One instance of the firmware, hour by hour.", "lever soak")
     page.section("hours", "Hours", "Consistency by the hour", page.figure("chart", _chart(result), ""), _SEES)
-    shown = [[html.escape(_text(cell)) for cell in row.values()] for row in rows]
-    page.section("table", "Table", "All figures", table([html.escape(name) for name in rows[0]], shown))
+    page.section("table", "Table", "All figures", rows_table(rows))
     return page.html(f'<p class="verdict {"bad" if result.troubles() else "good"}">{html.escape(verdict)}</p>')
-
-
-def _text(cell: object) -> str:
-    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
 
 
 def _chart(result: SoakResult) -> Figure:

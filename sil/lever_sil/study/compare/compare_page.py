@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from lever_cdkf.cli.tables import Row as TableRow
 from lever_cdkf.report.figure import Spec
 from lever_cdkf.report.page import Page
-from lever_cdkf.report.summary_html import number, table
+from lever_cdkf.report.summary_html import number, rows_table, table
 
 from . import charts
 from .cases import PRIOR, cases
@@ -143,19 +143,14 @@ def _wrong_noise(page: Page, rows: Sequence[Row]) -> None:
 def _table(lines: Sequence[TableRow]) -> str:
     """Return the table of estimators with a column for each, as they have more figures than a page is wide."""
     if not lines or "estimator" not in lines[0]:
-        return _rows(lines)
+        return rows_table(lines, 3)
     parts = (lines[first : first + _ESTIMATORS] for first in range(0, len(lines), _ESTIMATORS))
-    return "".join(_rows(_turned(part)) for part in parts)
+    return "".join(rows_table(_turned(part), 3) for part in parts)
 
 
 def _turned(lines: Sequence[TableRow]) -> list[TableRow]:
     figures = [name for name in lines[0] if name != "estimator"]
     return [{"": name, **{str(line["estimator"]): line[name] for line in lines}} for name in figures]
-
-
-def _rows(lines: Sequence[TableRow]) -> str:
-    header = [html.escape(column) for column in lines[0]] if lines else []
-    return table(header, ([html.escape(number(cell)) for cell in line.values()] for line in lines))
 
 
 def _verdict(claims: Sequence[Claim]) -> str:
