@@ -18,7 +18,6 @@
 #define FLOAT_LIMIT 1.0e9f /* no member is as large */
 #define MODERATE 1.0e6f    /* members whose squares are used */
 
-enum { SINGLE = 9, GROUPS = 4 }; /* floats of an estimate that are no array; these and its arrays */
 
 /* From one member to another of the same size, side by side. */
 #define MEMBERS(first, last, size, most)                                                                               \
@@ -283,16 +282,6 @@ static bool is_near(float value, float expected)
     return fabsf(value - expected) <= (1.0e-3f * fabsf(expected));
 }
 
-/* Also where it goes on from: a square of a larger one would not be. */
-static bool are_finite(const float value[], uint32_t count)
-{
-    bool finite = true;
-    for (uint32_t i = 0u; i < count; i++) {
-        finite = finite && (fabsf(value[i]) < FLOAT_LIMIT); /* NaN is not */
-    }
-    return finite;
-}
-
 /* The parameters and the coefficients at the sigma points are those of the belief. */
 static bool is_drawn(const estimator_t *estimator)
 {
@@ -318,17 +307,12 @@ static bool is_belief(const cdkf_t *cdkf)
            factor_is_whole(cdkf->s_xx, MODEL_STATES);
 }
 
-/* A belief that may be returned to keeps the invariant, and all that is stated of it is finite. */
+/* A belief that may be returned to keeps the invariant, too. */
 static bool can_return(const estimator_t *estimator, const snapshot_t *kept)
 {
     cdkf_t returned = estimator->cdkf; /* cppcheck-suppress misra-c2012-9.3 ; D3 */
     cdkf_return(&returned, kept);
-    cdkf_draw(&returned, estimator->setup.model_in_use, &estimator->setup.constants);
-    float size = cdkf_state_sigma(&returned, 0u) + cdkf_state_sigma(&returned, 1u);
-    for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
-        size += cdkf_parameter_sigma(&returned, i);
-    }
-    return is_belief(&returned) && (size < FLOAT_LIMIT);
+    return is_belief(&returned);
 }
 
 /* What the belief is moved by is no more than settings and samples can make it, so that no product of it overflows. */
@@ -344,29 +328,14 @@ static bool is_moderate(const cdkf_t *cdkf)
     return (size < MODERATE) && (cdkf->growth >= 0.0f);
 }
 
-/* Values that are possible one by one may contradict each other: the filter keeps its invariant, and all of the
- * estimate is finite. */
-static bool is_consistent(const lever_t *lever)
+/* Values that are possible one by one may contradict each other: the filter keeps its invariant. */
+static bool is_consistent(const estimator_t *estimator)
 {
-    lever_estimate_t estimate;
-    lever_estimate(lever, &estimate);
-    const float single[SINGLE] = {estimate.theta, estimate.theta_dot, estimate.theta_sigma, estimate.theta_dot_sigma,
-        estimate.trim, estimate.natural_frequency, estimate.natural_frequency_sigma, estimate.damping_ratio,
-        estimate.damping_ratio_sigma};
-    const float *const group[GROUPS] = {
-        estimate.parameter_correlation, estimate.parameter, estimate.parameter_sigma, single};
-    static const uint8_t count[GROUPS] = {LEVER_PARAMETERS, LEVER_PARAMETERS, LEVER_PARAMETERS, SINGLE};
-    bool finite = true;
-    for (uint32_t i = 0u; i < (uint32_t)GROUPS; i++) {
-        finite = finite && are_finite(group[i], count[i]);
-    }
-    const learning_t *learning = &lever->estimator.learning;
+    const learning_t *learning = &estimator->learning;
     const bool positive =
-        (estimate.nis >= 0.0f) && (learning->evidence.motion.slow >= 0.0f) && (learning->elapsed >= 0.0f);
-    const snapshot_t *kept = learning->kept;
-    return finite && positive && is_belief(&lever->estimator.cdkf) && is_drawn(&lever->estimator) &&
-           is_moderate(&lever->estimator.cdkf) && can_return(&lever->estimator, &kept[0]) &&
-           can_return(&lever->estimator, &kept[1]);
+        (estimator->nis >= 0.0f) && (learning->evidence.motion.slow >= 0.0f) && (learning->elapsed >= 0.0f);
+    return positive && is_belief(&estimator->cdkf) && is_drawn(estimator) && is_moderate(&estimator->cdkf) &&
+           can_return(estimator, &learning->kept[0]) && can_return(estimator, &learning->kept[1]);
 }
 
 bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])
@@ -377,7 +346,7 @@ bool lever_state_restore(lever_t *lever, const uint8_t state[LEVER_STATE_BYTES])
     if (accepted) {
         const lever_t before = *lever;
         adopt(lever, state);
-        accepted = is_consistent(lever);
+        accepted = is_consistent(&lever->estimator);
         if (!accepted) {
             *lever = before;
         }
