@@ -131,10 +131,10 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance: 2,376 bytes, and as much more as pointers are longer than 32 bits. */
+/* Room for one instance: 2,392 bytes, and as much more as pointers are longer than 32 bits. */
 typedef struct lever_room {
     const void *pointers[4];
-    uint8_t rest[2360];
+    uint8_t rest[2376];
 } lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
@@ -423,7 +423,7 @@ void lever_platform(lever_t *lever, const lever_platform_t *platform);
 /* All torque for the motor leaves through one gate: finite, then torque_limit, torque_slew, torque_rms over one second.
  * It is open while all of this holds; otherwise torque fades to exactly zero within 50 ms:
  *   - mode RUN or FROZEN, or COAST for as long as the next line allows;
- *   - a sample with a valid theta or theta_dot came within 20 ms or three sample periods, whichever is longer;
+ *   - a sample with a believed theta or theta_dot came within 20 ms or three sample periods, whichever is longer;
  *   - the sample clock advances;
  *   - a COMMAND, or lever_command(), was accepted within the last second of sample time: repeat one (keep-alive);
  *   - the platform reports none of ROM, SELF_TEST, WATCHDOG, HARD_FAULT, and the settings are as lever_init() found
@@ -480,7 +480,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 2074 };
+enum lever_state_limits { LEVER_STATE_BYTES = 2086 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

@@ -52,6 +52,8 @@ void alignment_begin(estimator_t *estimator, const checked_t *sample)
     (void)memset(&estimator->alignment, 0, sizeof estimator->alignment);
     (void)memset(
         &evidence->motion, 0, sizeof evidence->motion); /* nothing is learnt before the lever is seen to move */
+    (void)memset(&evidence->kinematics, 0, sizeof evidence->kinematics);
+    evidence->paired = false; /* its last sample is one of before */
     evidence->nis_slow = 1.0f;
     alignment_step(estimator, sample, 0.0f);
 }

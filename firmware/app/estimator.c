@@ -140,12 +140,13 @@ static void check(
     const bool jumped =
         checked->base && successive &&
         has_jumped(estimator, INPUT_BASE, LEVER_FAULT_BASE, sample->z_ddot - estimator->raw_z_ddot, elapsed);
+    evidence_follow_command(evidence, commanded_torque, elapsed);
     const bool unknown = !torque && evidence_has_other_torque(evidence);
     const float presumed = (torque_jumped || unknown) ? estimator->last_tau_m : commanded_torque;
     checked->tau_m = torque ? tau_m : presumed;
     checked->torque = !unknown || torque_jumped;
     if (torque && ((estimator->samples % (uint32_t)EVIDENCE_TORQUE_EVERY) == 0u)) {
-        evidence_add_torque(evidence, commanded_torque, checked->tau_m);
+        evidence_add_torque(evidence, checked->tau_m);
     }
     checked->z_ddot =
         (checked->base && !jumped) ? compensated(estimator, sample->z_ddot, elapsed) : estimator->last_z_ddot;
@@ -285,6 +286,7 @@ static void watch_alignment(estimator_t *estimator, float elapsed)
 {
     evidence_note(&estimator->learning.evidence, EVIDENCE_MISSING, true);
     (void)learning_step(&estimator->learning, &estimator->setup, &estimator->cdkf, true, elapsed);
+    estimator->faults |= estimator->learning.evidence.faults;
 }
 
 /* A sample `elapsed` seconds after the last one. */
@@ -305,6 +307,8 @@ static void step(estimator_t *estimator, checked_t *sample, const inputs_t *last
     } else if (estimator->mode == LEVER_MODE_ALIGN) {
         watch_alignment(estimator, elapsed);
         alignment_step(estimator, sample, elapsed);
+        note(
+            estimator, (estimator->mode == LEVER_MODE_RUN) && (estimator->trim.unsettled > 0.0f), LEVER_FAULT_SETTLING);
     } else {
         prediction_advance(estimator, sample, last, elapsed, periods);
         correct(estimator, sample, elapsed);

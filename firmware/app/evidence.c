@@ -14,10 +14,13 @@
 #define ALIVE 0.4f              /* a base acceleration that changed for so long never stands still [s] */
 #define BASE_MEMORY 0.5f        /* [s], */
 #define BASE_MEMORY_WRONG 0.2f  /* and while it is wrong */
+#define BASE_USUAL 1.0f         /* of the mean that the base goes on as [s], */
+#define BASE_LESS 0.1f          /* or by less than so much of it, in squares */
 #define BASE_DOUBT 0.35f        /* standard deviation of the gain up to which there may be doubt, */
 #define BASE_SURE 0.1f          /* standard deviation of the gain up to which it counts, */
 #define BASE_SURE_WRONG 0.2f    /* and while the base is wrong, when the state hardly follows it */
 #define AGREEMENT_MEMORY 0.5f   /* of motor and kinematics [s] */
+#define MOTOR_LAG 0.003f        /* motors lag by 1 to 5 ms [s] */
 #define TORQUE_MIN 4e-4f        /* mean square of the command from which on it says anything [N^2 m^2] */
 #define TORQUE_SURE 1.6f        /* torque of other origin over the command, both rms, that this is allowed times */
 #define KINEMATICS_CORNER 5.0f  /* of the high-pass [rad/s] */
@@ -25,7 +28,7 @@
 #define KINEMATICS_LINE 0.0105f /* the rate is on a straight line between samples that are so close [s] */
 #define KINEMATICS_MIN 1e-6f    /* mean square of the integral from which on it says anything [rad^2] */
 #define KINEMATICS_BLOCK 0.02f  /* more often than this the sums hardly get new information [s] */
-#define KINEMATICS_BLOCKS 4.0f  /* from which on the gain has a standard deviation */
+#define KINEMATICS_BLOCKS 6.0f  /* from which on the gain has a standard deviation */
 #define KINEMATICS_SURE 2.5f    /* standard deviations that the gain may be off */
 #define OTHER_SHARE 0.01f       /* of its mean, by one sample in EVIDENCE_TORQUE_EVERY */
 #define OTHER_LEAST 2.5e-3f     /* mean square that is more than noise of the sensor [N^2 m^2] */
@@ -113,10 +116,15 @@ static void agreement_add(agreement_t *agreement, float expected, float measured
     agreement->product += expected * measured;
 }
 
-void evidence_add_torque(evidence_t *evidence, float commanded, float measured)
+void evidence_follow_command(evidence_t *evidence, float commanded, float elapsed)
 {
-    const float other = measured - commanded;
-    agreement_add(&evidence->torque, commanded, measured);
+    evidence->commanded += lesser(elapsed * (1.0f / MOTOR_LAG), 1.0f) * (commanded - evidence->commanded);
+}
+
+void evidence_add_torque(evidence_t *evidence, float measured)
+{
+    const float other = measured - evidence->commanded;
+    agreement_add(&evidence->torque, evidence->commanded, measured);
     evidence->other_torque += OTHER_SHARE * ((other * other) - evidence->other_torque);
 }
 
@@ -183,6 +191,16 @@ static void judge_stillness(evidence_t *evidence, enum signal signal, float peri
     evidence->seen[signal] = false;
 }
 
+/* Whether the base goes on as it did for a second: otherwise the lever may well stand still. */
+static bool base_goes_on(motion_t *motion, const stillness_t *base, float period)
+{
+    const float change = base->now - base->before;
+    const float square = change * change;
+    motion->base_slow += share_of(period, BASE_USUAL) * (square - motion->base_slow);
+    motion->base_fast += share_of(period, NIS_TIME) * (square - motion->base_fast);
+    return motion->base_fast > (BASE_LESS * motion->base_slow);
+}
+
 static void judge_base(evidence_t *evidence, const score_t *sudden, float period)
 {
     score_t *base = &evidence->base;
@@ -195,7 +213,7 @@ static void judge_base(evidence_t *evidence, const score_t *sudden, float period
     if ((base->information * (BASE_DOUBT * BASE_DOUBT)) > 1.0f) {
         const float gain = (before ? 0.0f : 1.0f) - (base->vector / base->information);
         const float away = fabsf(gain - 1.0f);
-        evidence->ratio[EVIDENCE_BASE] = away * rows[EVIDENCE_BASE].inverse;
+        evidence->ratio[EVIDENCE_BASE] = lesser(away * rows[EVIDENCE_BASE].inverse, 1.0f); /* not sure yet */
         if ((base->information * (sure * sure)) > 1.0f) {
             (void)evidence_set(evidence, EVIDENCE_BASE, away);
         }
@@ -236,7 +254,8 @@ static void judge_motor(evidence_t *evidence, float period, float sample_period)
 }
 
 /* Compares the angle with the integral of the rate. The gain's standard deviation is what else differs, over the root
- * of the effective number of blocks (Kish 1965), as a few large ones may be most of the sum. */
+ * of the effective number n of blocks (Kish 1965), as a few large ones may be most of the sum; n / (n - 2) times that, as
+ * it is of so few itself (variance of Student's t). */
 static void judge_kinematics(evidence_t *evidence, float period)
 {
     kinematics_t *of = &evidence->kinematics;
@@ -249,7 +268,8 @@ static void judge_kinematics(evidence_t *evidence, float period)
     const float expected = of->agreement.expected;
     const float blocks = (expected * expected) * lesser(period * (1.0f / KINEMATICS_BLOCK), 1.0f);
     if ((expected > least) && (blocks > (KINEMATICS_BLOCKS * of->fourth))) { /* else it stays as it is */
-        const float sure = KINEMATICS_SURE * sqrtf(of->fourth / blocks);
+        const float inverse = of->fourth / blocks;
+        const float sure = (KINEMATICS_SURE * sqrtf(inverse)) / (1.0f - (2.0f * inverse));
         (void)evidence_set(evidence, EVIDENCE_KINEMATICS, agreement_away(&of->agreement, sure));
     }
     agreement_forget(&of->agreement, keep);
@@ -299,6 +319,7 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     for (uint32_t i = 0u; i < (uint32_t)INPUT_COUNT; i++) {
         input_gate_end_block(&evidence->input[i], harmless[i], period, setup->settings->sample_period);
     }
+    const bool driven = base_goes_on(&evidence->motion, &evidence->stillness[SIGNAL_BASE], period);
     for (uint32_t i = 0u; i < (uint32_t)SIGNAL_COUNT; i++) {
         judge_stillness(evidence, (enum signal)i, period);
     }
@@ -321,7 +342,7 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     judge_noise(evidence, block);
     judge_states(evidence, cdkf, block);
     (void)evidence_set(evidence, EVIDENCE_STICKING,
-        sticking_judge(&evidence->sticking, evidence->motion.slow, cdkf->output_noise[1], moves));
+        sticking_judge(&evidence->sticking, evidence->motion.slow, cdkf->output_noise[1], moves && driven));
     (void)evidence_set(evidence, EVIDENCE_COLOUR, whiteness_correlation(&evidence->whiteness));
     if (adapts && moves && !block->held &&
         (evidence->ratio[EVIDENCE_BASE] <

@@ -56,6 +56,8 @@ typedef struct motion {
     float slow;               /* mean square over excitation_time [rad^2/s^2], */
     float fast;               /* and over 0.1 s */
     float last[MODEL_STATES]; /* deviations of the last sample that measured each output, as a rate [rad/s] */
+    float base_slow;          /* mean square change of the base acceleration in a block over 1 s [m^2/s^4], */
+    float base_fast;          /* and over 0.1 s */
 } motion_t;
 
 typedef struct evidence {
@@ -74,6 +76,7 @@ typedef struct evidence {
     input_gate_t input[INPUT_COUNT];
     score_t base;       /* of CDKF_BASE_GAIN, with exponential forgetting */
     agreement_t torque; /* measured with commanded [N m] */
+    float commanded;    /* as a motor follows it [N m] */
     float other_torque; /* mean square of what the motor was not asked for, while it was measured [N^2 m^2] */
     kinematics_t kinematics;
     change_detection_t change;
@@ -135,9 +138,12 @@ static inline bool evidence_repeats(const evidence_t *evidence, enum signal sign
 /* Output y, which is not valid where it is refused. The squares of innovations are now `level` times those expected. */
 bool evidence_refuses_output(evidence_t *evidence, const cdkf_t *cdkf, uint32_t i, float y, float level, float elapsed);
 
-/* A measured torque and the one that was commanded before it [N m]; one sample in EVIDENCE_TORQUE_EVERY is enough. */
+/* The torque that was commanded before this sample [N m], by each. */
+void evidence_follow_command(evidence_t *evidence, float commanded, float elapsed);
+
+/* A measured torque beside it [N m]; one sample in EVIDENCE_TORQUE_EVERY is enough. */
 enum { EVIDENCE_TORQUE_EVERY = 8 };
-void evidence_add_torque(evidence_t *evidence, float commanded, float measured);
+void evidence_add_torque(evidence_t *evidence, float measured);
 
 /* Whether the torque may be other than the commanded one where it is not measured: somebody else was driving. */
 bool evidence_has_other_torque(const evidence_t *evidence);

@@ -18,7 +18,6 @@
 #define FLOAT_LIMIT 1.0e9f /* no member is as large */
 #define MODERATE 1.0e6f    /* members whose squares are used */
 
-
 /* From one member to another of the same size, side by side. */
 #define MEMBERS(first, last, size, most)                                                                               \
     {(uint16_t)offsetof(struct lever, first),                                                                          \

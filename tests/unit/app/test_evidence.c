@@ -287,7 +287,7 @@ static uint32_t apart_after(swing_t swing)
 static const swing_t agreeing = {.amplitude = 0.01, .gain = 1.0, .rate_gain = 1.0, .noise = 5.0e-4};
 
 /* R33 */
-TEST(an_angle_that_is_not_the_integral_of_the_rate_is_found_within_0_6_s)
+TEST(an_angle_that_is_not_the_integral_of_the_rate_is_found_within_a_second)
 {
     static const double gains[][2] = {
         {1.3, 1.0}, {0.7, 1.0}, {0.0, 1.0}, {2.0, 1.0}, {1.0, -1.0}, {1.0, 0.5}, {1.0, 1.5}};
@@ -357,8 +357,9 @@ static uint32_t torque_wrong_after(double amplitude, double gain, double other)
             const double time = 1.0e-3 * (double)((20u * block) + k);
             const double asked = amplitude * sin(6.283185307 * 3.0 * time);
             const double measured = (gain * asked) + (other * sin(6.283185307 * 4.0 * time));
+            evidence_follow_command(&evidence, (float)asked, 1.0f);
             if ((k % (uint32_t)EVIDENCE_TORQUE_EVERY) == 0u) {
-                evidence_add_torque(&evidence, (float)asked, (float)measured);
+                evidence_add_torque(&evidence, (float)measured);
             }
         }
         const bool before = evidence_has(&evidence, EVIDENCE_MOTOR);
@@ -401,6 +402,73 @@ TEST(a_torque_that_follows_again_is_right_and_without_dither_nothing_is_said)
         (void)torque_wrong_after(0.0, 0.0, 0.2);
     }
     TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_MOTOR));
+}
+
+/* What a motor does is compared with its command 3 ms ago, as a lag of first order: after 3 ms 1 - 1/e of a step, by
+ * steps of a millisecond 1 - (2/3)^3. */
+TEST(a_motor_follows_its_command_with_a_lag)
+{
+    for (uint32_t k = 0u; k < 3u; k++) {
+        evidence_follow_command(&evidence, 1.0f, PERIOD);
+    }
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-5f, 19.0f / 27.0f, evidence.commanded);
+    evidence_follow_command(&evidence, -1.0f, 0.01f);
+    TEST_ASSERT_EQUAL_FLOAT(-1.0f, evidence.commanded);
+    evidence_add_torque(&evidence, -0.5f);
+    TEST_ASSERT_EQUAL_FLOAT(1.0f, evidence.torque.expected);
+    TEST_ASSERT_EQUAL_FLOAT(0.25f, evidence.torque.measured);
+    TEST_ASSERT_EQUAL_FLOAT(0.5f, evidence.torque.product);
+    TEST_ASSERT_EQUAL_FLOAT(0.0025f, evidence.other_torque); /* a hundredth of the square of what is other */
+}
+
+/* So many blocks in which the base acceleration has steps of this size, and the lever stands still between its motions.
+ * Returns by how much the excess has grown. */
+static float stick(uint32_t blocks, float step)
+{
+    const float before = evidence.sticking.excess;
+    for (uint32_t k = 0u; k < blocks; k++) {
+        const float base = ((k % 2u) == 0u) ? step : -step;
+        const float rate = ((k % 10u) < 5u) ? 0.0f : 0.2f;
+        (void)evidence_sees(&evidence, SIGNAL_BASE, base);
+        for (uint32_t i = 0u; i < (uint32_t)SAMPLES; i++) {
+            evidence.motion.slow = 0.02f;
+            evidence.motion.fast = 0.02f;
+            sticking_add(&evidence.sticking, rate, PERIOD);
+        }
+        evidence.awake = 1.0f;
+        end_block();
+    }
+    return evidence.sticking.excess - before;
+}
+
+/* A lever that stands still while the base shakes it sticks; where the base has become calm it may. */
+/* R60 */
+TEST(a_standstill_counts_while_the_base_goes_on)
+{
+    TEST_ASSERT_TRUE(stick(200u, 1.0f) > 1.0f);
+    setUp();
+    (void)stick(100u, 1.0f);
+    (void)stick(20u, 0.1f); /* in squares a hundredth: less than a tenth after 0.23 s */
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, stick(50u, 0.1f));
+    TEST_ASSERT_TRUE(fabsf(stick(200u, 0.1f)) > 0.0f); /* it is what is usual now: a tenth after 2.2 s */
+    setUp();
+    (void)stick(100u, 1.0f);
+    (void)stick(20u, 0.4f); /* a sixth is no calm */
+    TEST_ASSERT_TRUE(fabsf(stick(50u, 0.4f)) > 0.0f);
+}
+
+/* Of a base that has been given up, and of one that is not sure, the ratio is at most 1. */
+TEST(a_ratio_of_the_base_above_one_is_evidence)
+{
+    for (uint32_t i = 0u; i < 2u; i++) {
+        setUp();
+        const float information = (i == 0u) ? 50.0f : 200.0f; /* standard deviations of 0.14 and 0.07 */
+        evidence.base = (score_t){information, information};  /* a gain of 0 */
+        end_block();
+        TEST_ASSERT_EQUAL(i == 1u, evidence_has(&evidence, EVIDENCE_BASE));
+        TEST_ASSERT_EQUAL(i == 1u, evidence.ratio[EVIDENCE_BASE] > 1.0f);
+        TEST_ASSERT_TRUE(evidence.ratio[EVIDENCE_BASE] > 0.99f);
+    }
 }
 
 /* Sums forget with 0.5 s, and while the base is wrong with 0.2 s; from a standard deviation of 0.1 on, and 0.2, they

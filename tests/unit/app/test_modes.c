@@ -142,6 +142,51 @@ TEST(levels_settle_for_the_whole_of_their_time_after_a_gap)
 }
 
 /* R29 */
+TEST(the_first_sample_after_alignment_says_that_levels_settle)
+{
+    run_for(3000u);
+    lever_sample_t sample = sample_after(1000u);
+    TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, lever_update(lever, &sample));
+    while (run(1u) == LEVER_MODE_ALIGN) {
+        TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_SETTLING));
+    }
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_SETTLING));
+}
+
+/* Angle and rate are compared anew after a gap: what the lever did meanwhile is no jump of the one alone. */
+/* R33 R55 */
+TEST(a_gap_is_no_difference_of_angle_and_rate)
+{
+    for (uint32_t trial = 0u; trial < 20u; trial++) {
+        start();
+        run_for(3000u + (37u * trial));
+        lever_sample_t sample = sample_after(1000u);
+        (void)lever_update(lever, &sample);
+        for (uint32_t k = 0u; k < 1500u; k++) {
+            (void)run(1u);
+            TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_THETA) || has_fault(LEVER_FAULT_THETA_DOT));
+        }
+    }
+}
+
+/* What was found wrong before the levels are aligned anew is so meanwhile, too. */
+/* R55 */
+TEST(faults_of_sensors_show_during_alignment)
+{
+    run_for(3000u);
+    for (uint32_t k = 0u; k < 1500u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        sample.theta_dot = -sample.theta_dot;
+        (void)lever_update(lever, &sample);
+    }
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_THETA_DOT));
+    lever_sample_t sample = sample_after(1000u);
+    (void)lever_update(lever, &sample);
+    TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, run(100u));
+    TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_THETA_DOT));
+}
+
+/* R29 */
 TEST(a_long_gap_keeps_the_parameters_and_widens_them_by_their_walk)
 {
     config.settings.z_ddot_gain_sigma = 0.0f; /* of a standard deviation that does not grow */
