@@ -1,5 +1,8 @@
 """What README files and pages tell people to type works: commands and Python run, C compiles.
 
+The pages that somebody reads first (FIRST) are run here, the others by test_pages.py, which is a proof: what they run
+takes minutes.
+
 Each fenced block of language `sh` or `python` is run, in the order of its page, so that it finds what those before have
 left in out/; a block of C is compiled. A page has a scratch folder that looks like the source tree, with the virtual
 environment active, and what conftest.py puts there. Not run are lines that begin with ctest or cmake (they are what
@@ -23,6 +26,7 @@ from lever_cdkf.signals.mapping import read_mapping
 from quality import tools
 from quality.conftest import SourceTree
 
+FIRST = ("README.md", "sil/README.md", "sil/SIL.md", "host_tools/README.md", "host_tools/API.md")
 IGNORED = set(re.findall(r"^/(\w+)/$", (tools.ROOT / ".gitignore").read_text(), re.MULTILINE))
 FOLDERS = ("firmware", "host_tools", "sil", "tests")
 READMES = [tools.ROOT / "README.md", *(file for folder in FOLDERS for file in (tools.ROOT / folder).rglob("README.md"))]
@@ -72,8 +76,8 @@ BLOCKS: list[Block] = sorted(
 )
 
 
-def cases(*languages: str) -> list[object]:
-    """Return the blocks of these languages, as parameters."""
+def cases(*languages: str, first: bool = True) -> list[object]:
+    """Return the blocks of these languages, on the first pages or the others, as parameters."""
     return [
         pytest.param(
             block,
@@ -81,7 +85,7 @@ def cases(*languages: str) -> list[object]:
             marks=[mark for words, mark in NEEDED.items() if words in block[3]],
         )
         for block in BLOCKS
-        if block[2] in languages
+        if block[2] in languages and (str(block[0].relative_to(tools.ROOT)) in FIRST) == first
     ]
 
 
@@ -167,6 +171,10 @@ def test_there_are_pages_and_every_abbreviation_is_needed() -> None:
 @pytest.mark.parametrize("block", cases("sh", "python"))
 def test_a_block_does_what_its_page_says(block: Block, source_tree: SourceTree, request: pytest.FixtureRequest) -> None:
     """To run one that needs what others have left: -k with the name of its page."""
+    run_block(block, source_tree, request)
+
+
+def run_block(block: Block, source_tree: SourceTree, request: pytest.FixtureRequest) -> None:
     page, _, _, content = block
     if "build/stm32f4" in content or "lever flash" in content:
         request.getfixturevalue("slcan_image")
@@ -174,7 +182,7 @@ def test_a_block_does_what_its_page_says(block: Block, source_tree: SourceTree, 
 
 
 @pytest.mark.requires("cc|gcc|clang")
-@pytest.mark.parametrize("block", cases("c"))
+@pytest.mark.parametrize("block", [*cases("c"), *cases("c", first=False)])
 def test_c(block: Block, tmp_path: Path) -> None:
     source = tmp_path / "example.c"
     source.write_text(block[3], encoding="utf-8")
