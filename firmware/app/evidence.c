@@ -87,15 +87,13 @@ void evidence_start(evidence_t *evidence)
     hands_start(&evidence->hands);
 }
 
-bool evidence_set(evidence_t *evidence, enum evidence_id which, float statistic)
+void evidence_set(evidence_t *evidence, enum evidence_id which, float statistic)
 {
     const evidence_row_t *row = &rows[which];
     const bool before = evidence_has(evidence, which);
     const float ratio = statistic * row->inverse;
-    const bool now = (ratio > (before ? row->off : 1.0f));
     evidence->ratio[which] = ratio;
-    evidence_note(evidence, which, now);
-    return now && !before;
+    evidence_note(evidence, which, ratio > (before ? row->off : 1.0f));
 }
 
 /* --- with each sample --------------------------------------------------------------------------------------------- */
@@ -181,7 +179,7 @@ static void judge_stillness(evidence_t *evidence, enum signal signal, float peri
     const bool told = evidence_has(evidence, which) || (evidence->nis_fast > SURPRISED) || taken;
     of->before = of->now;
     of->still = (changed || !seen) ? 0.0f : (of->still + period);
-    (void)evidence_set(evidence, which, told ? of->still : 0.0f);
+    evidence_set(evidence, which, told ? of->still : 0.0f);
     if ((signal == SIGNAL_BASE) && seen && changed) {
         evidence->alive = lesser(evidence->alive + period, ALIVE);
     }
@@ -215,7 +213,7 @@ static void judge_base(evidence_t *evidence, const score_t *sudden, float period
         const float away = fabsf(gain - 1.0f);
         evidence->ratio[EVIDENCE_BASE] = lesser(away * rows[EVIDENCE_BASE].inverse, 1.0f); /* not sure yet */
         if ((base->information * (sure * sure)) > 1.0f) {
-            (void)evidence_set(evidence, EVIDENCE_BASE, away);
+            evidence_set(evidence, EVIDENCE_BASE, away);
         }
     }
     if (evidence_has(evidence, EVIDENCE_BASE) != before) {
@@ -227,7 +225,7 @@ static void judge_base(evidence_t *evidence, const score_t *sudden, float period
 static void trust_base(evidence_t *evidence)
 {
     (void)memset(&evidence->base, 0, sizeof evidence->base);
-    (void)evidence_set(evidence, EVIDENCE_BASE, 0.0f);
+    evidence_set(evidence, EVIDENCE_BASE, 0.0f);
 }
 
 /* How far the gain of measured over expected is from 1, less `sure` times what else is measured, both rms. */
@@ -249,7 +247,7 @@ static void judge_motor(evidence_t *evidence, float period, float sample_period)
 {
     const float least = TORQUE_MIN * (AGREEMENT_MEMORY / ((float)EVIDENCE_TORQUE_EVERY * sample_period));
     const bool says = (evidence->torque.expected > least);
-    (void)evidence_set(evidence, EVIDENCE_MOTOR, says ? agreement_away(&evidence->torque, TORQUE_SURE) : 0.0f);
+    evidence_set(evidence, EVIDENCE_MOTOR, says ? agreement_away(&evidence->torque, TORQUE_SURE) : 0.0f);
     agreement_forget(&evidence->torque, 1.0f - share_of(period, AGREEMENT_MEMORY));
 }
 
@@ -270,7 +268,7 @@ static void judge_kinematics(evidence_t *evidence, float period)
     if ((expected > least) && (blocks > (KINEMATICS_BLOCKS * of->fourth))) { /* else it stays as it is */
         const float inverse = of->fourth / blocks;
         const float sure = (KINEMATICS_SURE * sqrtf(inverse)) / (1.0f - (2.0f * inverse));
-        (void)evidence_set(evidence, EVIDENCE_KINEMATICS, agreement_away(&of->agreement, sure));
+        evidence_set(evidence, EVIDENCE_KINEMATICS, agreement_away(&of->agreement, sure));
     }
     agreement_forget(&of->agreement, keep);
 }
@@ -284,9 +282,9 @@ static void judge_noise(evidence_t *evidence, const evidence_block_t *block)
     const bool tests = judged && (block->verdict != (uint8_t)VERDICT_REGRIP) && (since <= PROBATION);
     const bool ends = judged && (since > PROBATION) && (since < (PROBATION + (1.01f * block->period)));
     if (ends) {
-        (void)evidence_set(evidence, EVIDENCE_NOISE, (1.0f / EXPLAINED) * evidence->nis_fast);
+        evidence_set(evidence, EVIDENCE_NOISE, (1.0f / EXPLAINED) * evidence->nis_fast);
     } else if (tests || evidence_has(evidence, EVIDENCE_NOISE)) {
-        (void)evidence_set(evidence, EVIDENCE_NOISE, evidence->nis_fast);
+        evidence_set(evidence, EVIDENCE_NOISE, evidence->nis_fast);
     } else {
         evidence->ratio[EVIDENCE_NOISE] = 0.0f;
     }
@@ -326,10 +324,10 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     const hands_block_t hands = hands_step(
         &evidence->hands, &setup->constants, cdkf->x[1], period, moves && (setup->model == (uint8_t)LEVER_MODEL_LEVER));
     if (hands.counted) {
-        (void)evidence_set(evidence, EVIDENCE_HANDS, hands_statistic(&evidence->hands));
+        evidence_set(evidence, EVIDENCE_HANDS, hands_statistic(&evidence->hands));
     }
     if (grip_force_judge(&evidence->force, setup, &hands, &force)) {
-        (void)evidence_set(evidence, EVIDENCE_FORCE, force);
+        evidence_set(evidence, EVIDENCE_FORCE, force);
     }
     judge_motor(evidence, period, setup->settings->sample_period);
     judge_kinematics(evidence, period);
@@ -341,15 +339,15 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     }
     judge_noise(evidence, block);
     judge_states(evidence, cdkf, block);
-    (void)evidence_set(evidence, EVIDENCE_STICKING,
+    evidence_set(evidence, EVIDENCE_STICKING,
         sticking_judge(&evidence->sticking, evidence->motion.slow, cdkf->output_noise[1], moves && driven));
-    (void)evidence_set(evidence, EVIDENCE_COLOUR, whiteness_correlation(&evidence->whiteness));
+    evidence_set(evidence, EVIDENCE_COLOUR, whiteness_correlation(&evidence->whiteness));
     if (adapts && moves && !block->held &&
         (evidence->ratio[EVIDENCE_BASE] <
             CHANGE_WAITS)) { /* of an arm that has changed meanwhile it would say the same */
-        (void)evidence_set(evidence, EVIDENCE_CALIBRATION, calibration_step(&evidence->calibration, cdkf, period));
+        evidence_set(evidence, EVIDENCE_CALIBRATION, calibration_step(&evidence->calibration, cdkf, period));
     }
-    (void)evidence_set(evidence, EVIDENCE_INNOVATION, evidence->nis_slow);
+    evidence_set(evidence, EVIDENCE_INNOVATION, evidence->nis_slow);
 }
 
 void evidence_show(evidence_t *evidence)

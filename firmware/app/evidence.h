@@ -101,8 +101,8 @@ static inline bool evidence_has(const evidence_t *evidence, enum evidence_id whi
     return (evidence->present & ((uint32_t)1u << (uint32_t)which)) != 0u;
 }
 
-/* A statistic: its ratio, and with hysteresis whether the evidence is present. Returns true when it has just come. */
-bool evidence_set(evidence_t *evidence, enum evidence_id which, float statistic);
+/* A statistic: its ratio, and with hysteresis whether the evidence is present. */
+void evidence_set(evidence_t *evidence, enum evidence_id which, float statistic);
 
 /* A state. */
 static inline void evidence_note(evidence_t *evidence, enum evidence_id which, bool present)

@@ -457,6 +457,61 @@ TEST(a_standstill_counts_while_the_base_goes_on)
     TEST_ASSERT_TRUE(fabsf(stick(50u, 0.4f)) > 0.0f);
 }
 
+/* Angle and rate are compared over a line between samples of 10.5 ms, or one and a half periods, and where neither jumps
+ * by 0.03 rad more than the other. */
+TEST(angle_and_rate_are_compared_from_sample_to_sample_only)
+{
+    static const struct {
+        float period;
+        float elapsed;
+        float angle; /* by which the angle changes [rad], */
+        float rate;  /* and the integral of the rate */
+        bool on;
+    } row[] = {{0.001f, 0.0104f, 0.01f, 0.01f, true}, {0.001f, 0.0106f, 0.01f, 0.01f, false},
+        {0.01f, 0.0149f, 0.01f, 0.01f, true}, {0.01f, 0.0151f, 0.01f, 0.01f, false},
+        {0.001f, 0.001f, 0.029f, 0.0f, true}, {0.001f, 0.001f, 0.031f, 0.0f, false},
+        {0.001f, 0.001f, 0.02f, -0.02f, false}, {0.001f, 0.001f, 0.05f, 0.04f, true},
+        {0.001f, 0.001f, -0.031f, 0.0f, false}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        setUp();
+        const float rate = row[i].rate / row[i].elapsed;
+        const float before[] = {0.3f, rate};
+        const float now[] = {0.3f + row[i].angle, rate};
+        evidence_add_outputs(&evidence, before, true, 0.001f, row[i].period);
+        evidence_add_outputs(&evidence, before, true, 1.0f, row[i].period);
+        TEST_ASSERT_TRUE(evidence.kinematics.passed[0] == 0.0f);
+        evidence_add_outputs(&evidence, now, true, row[i].elapsed, row[i].period);
+        TEST_ASSERT_EQUAL(row[i].on, fabsf(evidence.kinematics.passed[0]) > 0.0f);
+        evidence_add_outputs(&evidence, now, false, 0.001f, row[i].period);
+        evidence_add_outputs(&evidence, now, true, 0.001f, row[i].period);
+        TEST_ASSERT_TRUE(evidence.kinematics.passed[0] == 0.0f); /* the one before was not a pair */
+    }
+}
+
+TEST(it_starts_long_after_a_change_and_without_a_ratio_that_nothing_is_known_of)
+{
+    TEST_ASSERT_EQUAL_FLOAT(EVIDENCE_LONG_AGO, evidence.since_change);
+    evidence.ratio[EVIDENCE_NOISE] = 0.9f;
+    evidence.ratio[EVIDENCE_BASE] = 0.9f;
+    end_block();
+    TEST_ASSERT_EQUAL_FLOAT(EVIDENCE_LONG_AGO, evidence.since_change);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, evidence.ratio[EVIDENCE_NOISE]);
+    TEST_ASSERT_EQUAL_FLOAT(0.0f, evidence.ratio[EVIDENCE_BASE]);
+}
+
+/* From a standard deviation of 0.35 of the gain on, there may be doubt of the base. */
+TEST(doubt_of_the_base_begins_before_it_is_sure)
+{
+    static const float sigma[] = {0.34f, 0.36f};
+    for (uint32_t i = 0u; i < 2u; i++) {
+        setUp();
+        const float information = (1.0f / (sigma[i] * sigma[i])) / 0.96f; /* a block of 20 ms forgets 4 % */
+        evidence.base = (score_t){0.5f * information, information};
+        end_block();
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, (i == 0u) ? (0.5f / 0.6f) : 0.0f, evidence.ratio[EVIDENCE_BASE]);
+    }
+}
+
 /* Of a base that has been given up, and of one that is not sure, the ratio is at most 1. */
 TEST(a_ratio_of_the_base_above_one_is_evidence)
 {

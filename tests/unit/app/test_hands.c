@@ -4,6 +4,8 @@
 #include "simulation.h"
 #include "test.h"
 
+#include <string.h>
+
 enum { SAMPLES = 20 }; /* in a block */
 
 #define PERIOD 1.0e-3f
@@ -17,6 +19,7 @@ static bool is_off;
 void setUp(void)
 {
     simulation = simulation_of((uint8_t)LEVER_MODEL_LEVER);
+    (void)memset(&hands, 0x40, sizeof hands); /* as memory may be */
     hands_start(&hands);
     is_off = false;
 }

@@ -1,5 +1,6 @@
 /* Modes: init, align, run, coast, frozen, and what leads from one to the other (fault: test_recovery.c); gaps in
  * time. */
+#include "app/instance.h"
 #include "model/model.h"
 #include "rig.h"
 
@@ -167,6 +168,20 @@ TEST(a_gap_is_no_difference_of_angle_and_rate)
             TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_THETA) || has_fault(LEVER_FAULT_THETA_DOT));
         }
     }
+}
+
+/* While levels are aligned nothing is estimated that anything could be learnt from, and means begin anew. */
+TEST(during_alignment_it_is_blind_and_afterwards_nothing_is_left_of_before)
+{
+    run_for(3000u);
+    lever->estimator.learning.evidence.nis_slow = 5.0f;
+    lever_sample_t sample = sample_after(1000u);
+    (void)lever_update(lever, &sample);
+    TEST_ASSERT_EQUAL_FLOAT(1.0f, lever->estimator.learning.evidence.nis_slow);
+    TEST_ASSERT_EQUAL(LEVER_MODE_ALIGN, run(100u));
+    TEST_ASSERT_EQUAL(VERDICT_BLIND, lever->estimator.learning.verdict);
+    TEST_ASSERT_EQUAL(LEVER_MODE_RUN, run(250u));
+    TEST_ASSERT_EQUAL(VERDICT_SETTLING, lever->estimator.learning.verdict);
 }
 
 /* What was found wrong before the levels are aligned anew is so meanwhile, too. */

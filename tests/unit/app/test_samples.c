@@ -337,6 +337,42 @@ TEST(an_angle_that_jumps_without_the_rate_has_another_offset)
     }
 }
 
+/* While the parameters are held, jumps add up: what is left counts above 0.02 rad, until the angle is measured anew after
+ * an outage. */
+/* R33 */
+TEST(what_is_left_of_an_offset_counts)
+{
+    static const struct {
+        float back; /* of 0.1 rad */
+        bool wrong;
+    } row[] = {{0.075f, true}, {0.085f, false}, {0.1f, false}};
+    run_both(8000u);
+    const lever_command_t command = {.request = (uint8_t)LEVER_REQUEST_FREEZE,
+        .model = (uint8_t)LEVER_KEEP,
+        .preload = (uint8_t)LEVER_KEEP,
+        .estimator = (uint8_t)LEVER_KEEP,
+        .adaptation = (uint8_t)LEVER_KEEP,
+        .mitigation = (uint8_t)LEVER_KEEP};
+    TEST_ASSERT_TRUE(lever_command(lever, &command) && lever_command(other, &command));
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        (void)run_off(1000u, 0.1f);
+        TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_THETA));
+        (void)run_off(1000u, 0.1f - row[i].back);
+        TEST_ASSERT_EQUAL(row[i].wrong, has_fault(LEVER_FAULT_THETA));
+        for (uint32_t k = 0u; k < 30u; k++) {
+            lever_sample_t sample = sample_after(1u);
+            (void)lever_update(other, &sample);
+            sample.theta_valid = false;
+            (void)lever_update(lever, &sample);
+        }
+        (void)run_off(1000u, 0.1f - row[i].back);
+        TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_THETA));
+        (void)run_off(1000u, 0.0f);
+        lever->estimator.learning.evidence.offset = 0.0f;
+        (void)run_off(40u, 0.0f);
+    }
+}
+
 /* The pilot moves the lever as fast: rate and angle agree, whatever the filter expected, and no offset is taken. */
 TEST(an_angle_that_the_rate_explains_has_no_other_offset)
 {

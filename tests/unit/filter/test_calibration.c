@@ -21,6 +21,7 @@ static bool is_wrong;
 void setUp(void)
 {
     source.state = 5u;
+    (void)memset(&calibration, 0x40, sizeof calibration); /* as memory may be */
     calibration_start(&calibration);
     is_wrong = false;
     cdkf.considered_sigma[CDKF_BASE_GAIN] = 0.02f;

@@ -3,6 +3,8 @@
 
 #include "test.h"
 
+#include <string.h>
+
 enum { L = MODEL_PARAMETERS };
 
 #define PERIOD 0.01f
@@ -14,6 +16,7 @@ static const double sigma[L] = {1.0e-3, 3.0e-4, 2.0e-2}; /* of a correction: sca
 
 void setUp(void)
 {
+    (void)memset(&change, 0x40, sizeof change); /* as memory may be */
     change_detection_init(&change);
 }
 
