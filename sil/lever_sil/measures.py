@@ -59,7 +59,8 @@ def longest(true: BoolArray) -> int:
 
 def covariance_of(sigma: Array, correlation: Array) -> Array:
     """Return (..., 3, 3) of standard deviations (..., 3) and correlations (..., 3): of the first and second, the first
-    and third, the second and third."""
+    and third, the second and third.
+    """
     matrix = np.zeros((*sigma.shape, 3))
     matrix[..., range(3), range(3)] = 1.0
     for index, (i, j) in enumerate(((0, 1), (0, 2), (1, 2))):
@@ -70,7 +71,8 @@ def covariance_of(sigma: Array, correlation: Array) -> Array:
 
 def normalised_squares(errors: Array, covariance: Array) -> Array:
     """Return (...) eᵀ P⁻¹ e of errors (..., n) with stated covariances (..., n, n): NEES; infinite for a singular
-    one."""
+    one.
+    """
     regular = np.linalg.slogdet(covariance).sign != 0.0
     invertible = np.where(regular[..., None, None], covariance, np.eye(covariance.shape[-1]))
     solved = np.linalg.solve(invertible, errors[..., None])[..., 0]
@@ -79,6 +81,7 @@ def normalised_squares(errors: Array, covariance: Array) -> Array:
 
 def first_without(true: BoolArray, count: int) -> Any:
     """Return (...) where along (..., T) the first `count` in a row that are not true begin; infinite where there are
-    none."""
+    none.
+    """
     blocked = np.lib.stride_tricks.sliding_window_view(true, count, axis=-1).any(axis=-1)
     return np.where(blocked.all(axis=-1), np.inf, blocked.argmin(axis=-1))

@@ -97,7 +97,8 @@ def parse(content: bytes, file: str) -> dict[str, Any]:
 
 def value_of(written: str) -> Any:
     """Return what KEY=VALUE of a command line gives: TOML when it is TOML, otherwise a string, so that a shell needs
-    no second quotes."""
+    no second quotes.
+    """
     try:
         return toml_text.parse(f"value = {written}".encode())["value"]
     except toml_text.NestedError as error:
@@ -217,7 +218,8 @@ def read_table(kind: type[T]) -> Reader:
 
 def table(kind: type[T]) -> Any:
     """Return a field that holds a nested table; a missing one is read as an empty one, so that its own defaults
-    hold."""
+    hold.
+    """
     return dataclasses.field(default_factory=lambda: kind(), metadata={"read": read_table(kind)})
 
 

@@ -38,7 +38,8 @@ def add_bus_options(parser: argparse.ArgumentParser) -> None:
 
 def chosen_options(args: argparse.Namespace, *, fd: bool = False) -> dict[str, Any]:
     """Return options for open_bus(), numbers and truth values as such; with `fd` of a bus with CAN FD, which other
-    interfaces than SocketCAN need more options for. Raise LeverError."""
+    interfaces than SocketCAN need more options for. Raise LeverError.
+    """
     from can.util import cast_from_string
 
     options: dict[str, Any] = {"fd": True} if fd and args.interface == "socketcan" else {}
@@ -61,7 +62,8 @@ def check_others_can_be_heard(interface: str) -> None:
 
 def open_bus(interface: str, channel: str | None, options: Mapping[str, Any], *, translated: bool = True) -> can.BusABC:
     """Return a python-can bus; `translated`: with the identifiers of lever.dbc, whatever they are on it. Raises
-    LeverError."""
+    LeverError.
+    """
     import can
 
     from .protocol_ahead import read_ahead

@@ -94,7 +94,8 @@ def check(identifier: int, data: bytes | bytearray) -> bool:
 @cache
 def _crc_table() -> NDArray[np.uint8]:
     """Return the CRC register after a byte, by register xor byte; the library starts with 0xFF and inverts at the
-    end."""
+    end.
+    """
     import numpy as np
 
     return np.array([calculate_crc8_h2f(bytes([index ^ 0xFF])) ^ 0xFF for index in range(256)], dtype=np.uint8)
@@ -246,7 +247,8 @@ def encoder(name: str) -> Callable[..., bytes]:
 
 def encode_columns(name: str, counters: NDArray[np.int64], values: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:
     """Encode N frames at once, as encoder() does, into (N, 8) bytes: all fields of a message without multiplexing,
-    by name."""
+    by name.
+    """
     import numpy as np
 
     definition, layout = message(name), _layout(name)
@@ -303,7 +305,8 @@ def encode(name: str, counter: int, values: Mapping[str, Value]) -> bytes:
 
 def decode(identifier: int, data: bytes | bytearray) -> tuple[str, dict[str, float]]:
     """Return name and fields of a received frame, choices as numbers, NaN for what is not available. Raises
-    CodecError if it is not in the DBC or corrupt."""
+    CodecError if it is not in the DBC or corrupt.
+    """
     definition = message(identifier)
     if not check(identifier, data):
         raise CodecError(f"{definition.name} ({identifier:#x}) {data.hex(' ')} is corrupt: its length or CRC is wrong")

@@ -44,7 +44,8 @@ class EstimatorFrames:
         self, recording: Recording, channel: str | None = None, start: float = 0.0, length: float = float("inf")
     ) -> None:
         """`channel`: the bus with the samples; by default the only one that has any. `start` and `length` [s] of
-        recorded time say which part is read; COMMAND frames before it belong to it."""
+        recorded time say which part is read; COMMAND frames before it belong to it.
+        """
         self.recording = recording
         self._start, self._end = start or -math.inf, start + length  # a clock that was set back belongs to the whole
         self.channel = channel
@@ -69,7 +70,8 @@ class EstimatorFrames:
 
     def chunks(self) -> Iterator[Frames]:
         """Yield the estimator's frames, inputs and recorded answers, in recorded order. Raise LogError without a
-        sample."""
+        sample.
+        """
         waiting: list[Frames] = []
         for frames in self._part():
             if self._bus is None:

@@ -48,7 +48,8 @@ class Recording:
 
     def __init__(self, paths: Iterable[str | os.PathLike[str]], *, translated: bool = True) -> None:
         """Open the logs and read the first frames of each. `translated`: with the identifiers of lever.dbc, whatever
-        they were on the bus. Raise LogError."""
+        they were on the bus. Raise LogError.
+        """
         self._translated = translated
         self.buses = Buses()
         self.damaged = 0
@@ -235,7 +236,8 @@ def _reader(path: str) -> Callable[[Recording, str], Iterator[Frames]]:
 
 def _is_file(path: str) -> bool:
     """Return False for what is there but has no end known before, such as a pipe. Raise LogError for what is not
-    there."""
+    there.
+    """
     try:
         mode = os.stat(path).st_mode
     except OSError as error:
@@ -274,7 +276,8 @@ def _blocks(text: Any) -> Iterator[bytes]:
 @contextmanager
 def _open_text(path: str) -> Iterator[tuple[Any, Callable[[], int]]]:
     """Yield the file object of a text that may be compressed, and a function that returns how many bytes have been
-    read."""
+    read.
+    """
     if path == "-":
         with open(sys.stdin.fileno(), "rb", buffering=0, closefd=False) as file:
             yield file, lambda: 0

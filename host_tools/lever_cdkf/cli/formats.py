@@ -25,7 +25,8 @@ def add_format_option(parser: argparse.ArgumentParser, usual: Sequence[str]) -> 
 
 def chosen_formats(args: argparse.Namespace) -> tuple[str, ...]:
     """Return what --format says; without it, says on standard error which of the usual files need an extra that is
-    missing. Raise LeverError for a format that needs one, and without --out."""
+    missing. Raise LeverError for a format that needs one, and without --out.
+    """
     if args.out is None:
         if args.format is not None:
             raise LeverError("--format is for the files of --out: say where these go")

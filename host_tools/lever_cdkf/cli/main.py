@@ -133,7 +133,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _has_streams() -> bool:
     """Return standard error and input that are closed are as /dev/null; without a standard output nothing is worth
-    running."""
+    running.
+    """
     for name, mode in (("stdin", "r"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  for the life of the process

@@ -76,7 +76,8 @@ def input_files(args: argparse.Namespace) -> list[str]:
 
 def chosen_aircraft(text: str) -> AircraftResponse:
     """Return the response in a file, or of NAME[,KEY=VALUE…] by the package that knows aircraft, where NAME may also
-    be a file that it reads. Raise LeverError."""
+    be a file that it reads. Raise LeverError.
+    """
     from ..firmware.aircraft import read_response
 
     if Path(text).is_file() and not text.lower().endswith(_OF_PACKAGE):

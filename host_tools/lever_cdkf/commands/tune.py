@@ -257,7 +257,8 @@ def _delay_to_mapping(
     args: argparse.Namespace, before: Assignments, after: Assignments
 ) -> tuple[Assignments, tuple[Path, str] | None]:
     """With signals that are mapped the delay goes into the mapping, which undoes it exactly; the settings, and the path
-    and text of the mapping."""
+    and text of the mapping.
+    """
     from dataclasses import replace
 
     from ..firmware.settings_file import make_config

@@ -58,7 +58,8 @@ class Column:
 
     def fresh(self, published: NDArray[np.bool_], recorded: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """At which samples there is a new one; `published` and `recorded` are those with new estimates of the run and
-        of the recording."""
+        of the recording.
+        """
         if not self.held:
             return np.ones(len(published), np.bool_)
         return recorded if self.kind == RECORDED else published

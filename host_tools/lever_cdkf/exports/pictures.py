@@ -63,7 +63,8 @@ def style() -> AbstractContextManager[None]:
 
 def render(figure: Figure, kind: str, title: str, provenance: Provenance | None = None, **more: Any) -> bytes:
     """Return the file of a figure laid out in style(); `more` are further properties of its provenance. The same
-    figure gives the same bytes."""
+    figure gives the same bytes.
+    """
     file = io.BytesIO()
     with style():
         figure.savefig(file, format=kind, dpi=RESOLUTION, metadata=_metadata(kind, title, provenance, more))

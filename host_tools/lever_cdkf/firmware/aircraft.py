@@ -1,5 +1,6 @@
 """What an estimator is given of the helicopter, to tell how near collective bounce is; and as a file, which lever_can
-reads as well (firmware/port/linux/aircraft.h says what is in it)."""
+reads as well (firmware/port/linux/aircraft.h says what is in it).
+"""
 
 from __future__ import annotations
 
@@ -45,7 +46,8 @@ class Correction(NamedTuple):
 
 class SeatTransfer(NamedTuple):
     """z_ddot at the pilot's seat over that at the accelerometer: direct + sum (by_rate s + by_place) / (s^2 + damping s
-    + stiffness), at most LEVER_SEAT_MODES of them."""
+    + stiffness), at most LEVER_SEAT_MODES of them.
+    """
 
     direct: float
     modes: Sequence[tuple[float, float, float, float]]
@@ -71,7 +73,8 @@ class AircraftResponse:
         gearing, delays and actuator [(m/s²)/rad]; how well that is known: gain_sigma relative to it [1], phase_sigma
         [rad]; warning and alarm: limits of the gain margin [dB]; seat: where the accelerometer is not there, what lies
         between, and None where that is not known: then the response is that at the accelerometer; name: what it is of,
-        for people. Raises LeverError."""
+        for people. Raises LeverError.
+        """
         self.name = name
         most = lib.LEVER_AIRCRAFT_POINTS
         if len(frequency) != len(response) or not 3 <= len(frequency) <= most:

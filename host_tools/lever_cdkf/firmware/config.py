@@ -92,7 +92,8 @@ class Parameter(NamedTuple):
 @cache
 def model_parameters(model: str) -> tuple[Parameter, ...]:
     """Return the parameters of a model, in the order of lever_estimate_t. Raise SettingsError for a model that is
-    none."""
+    none.
+    """
     number = choice_value("lever_model", "model", model)
     return tuple(
         Parameter(

@@ -203,7 +203,8 @@ class Estimator:
 
     def test_ratios(self) -> dict[str, float]:
         """Return each statistic that is watched for faults and changes, over its threshold [1]: above 1 it is
-        evidence."""
+        evidence.
+        """
         ratios = ffi.new("float[]", lib.LEVER_TEST_RATIOS)
         lib.lever_test_ratios(self.pointer, ratios)
         return dict(zip(TEST_RATIOS, ratios, strict=True))
@@ -235,14 +236,16 @@ class Estimator:
 
     def state(self) -> bytes:
         """Return all that its future depends on besides configuration, aircraft and what it is given; between two
-        samples."""
+        samples.
+        """
         room = ffi.new("uint8_t[]", lib.LEVER_STATE_BYTES)
         lib.lever_state_save(self.pointer, room)
         return bytes(room)
 
     def restore(self, state: bytes) -> bool:
         """Go on from the state of an instance with the same settings; False, and unchanged, for one that is of
-        another kind."""
+        another kind.
+        """
         return len(state) == lib.LEVER_STATE_BYTES and bool(lib.lever_state_restore(self.pointer, state))
 
     def on_frame(self, identifier: int, data: bytes | bytearray) -> int:
@@ -262,7 +265,8 @@ class Estimator:
 
     def next_frame(self) -> tuple[int, bytes] | None:
         """Return the next frame to send, as identifier and data; None when there is none left. Fetch them after
-        every frame taken: a COMMAND is acknowledged, sample or not."""
+        every frame taken: a COMMAND is acknowledged, sample or not.
+        """
         answer = self._answer
         if not lib.lever_next_frame(self.pointer, answer):
             return None
@@ -285,7 +289,8 @@ class Recorder:
 
     def frames(self) -> Iterator[tuple[int, bytes]]:
         """Yield those to send now: after a step all of whose frames have been fetched, before the next frame is
-        taken."""
+        taken.
+        """
         lib.lever_recorder_step(self.pointer, self._estimator.pointer)
         while lib.lever_recorder_next_frame(self.pointer, self._frame):
             yield self._frame.id, bytes(ffi.buffer(self._frame.data))
@@ -293,7 +298,8 @@ class Recorder:
 
 def feed(estimator: Estimator, samples: NDArray[Any], at: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:
     """Have the estimator take samples (lever_sample_t), up to the last with an index in `at`, which rise. Returns
-    lever_estimate_t and lever_health_t after each of these."""
+    lever_estimate_t and lever_health_t after each of these.
+    """
     import numpy as np
 
     asked = np.ascontiguousarray(at, np.int64)

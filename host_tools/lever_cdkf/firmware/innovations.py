@@ -26,7 +26,8 @@ INNOVATION = struct_dtype("sample_innovation_t")
 def samples_of(frames: Array, config: Config | None = None) -> tuple[Array, dict[str, str], Health]:
     """Return the samples (SAMPLE) that the firmware makes of received frames (FRAME), the choices (model, preload …)
     that commands among them have made, and its counts of what was wrong; lost is what comes later than
-    sample_period."""
+    sample_period.
+    """
     samples = np.empty(len(frames), SAMPLE)
     config, health = config or Config(), ffi.new("lever_health_t *")
     with _one_at_a_time:

@@ -23,7 +23,8 @@ ffi: Any = cffi.FFI()
 @cache
 def load(library: str) -> Any:
     """Return the functions of a shared library; what installing has made of its header declares them. Raises
-    LeverError."""
+    LeverError.
+    """
     ffi.cdef(native_file(f"{library}_cdef.h").read_text(encoding="utf-8"))
     path = native_file(shared_library(library))
     try:

@@ -80,7 +80,8 @@ def quantities(model: str) -> tuple[Quantity, ...]:
 
 def recorded_name(column: str) -> str:
     """Return the column of an estimate as a replayed log has it: k_p_recorded_N_m of k_p_estimate_N_m, nis_recorded
-    of nis."""
+    of nis.
+    """
     for kind in ("_estimate", "_sigma"):
         if kind in column:
             return column.replace(kind, "_recorded" if kind == "_estimate" else "_recorded_sigma")

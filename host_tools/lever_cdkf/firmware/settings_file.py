@@ -68,7 +68,8 @@ def read_assignments(path: str | os.PathLike[str]) -> dict[str, str | float]:
 
 def lines_of(path: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
     """Yield the lines of a file, as FILE:LINE and text, without comments, blanks around it and lines of these alone.
-    Raise SettingsError."""
+    Raise SettingsError.
+    """
     try:
         content = Path(path).read_bytes()
     except OSError as error:

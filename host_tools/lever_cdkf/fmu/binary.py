@@ -57,7 +57,8 @@ def compiler() -> list[str]:
 
 def compile_library(folder: Path, sources: Sequence[str], library: Path) -> None:
     """Compile `sources` (paths below `folder`, which is where their headers are from, too) into `library`. Raises
-    LeverError."""
+    LeverError.
+    """
     library.parent.mkdir(parents=True)
     include = ("-I", str(folder), "-isystem", str(headers()))
     command = [*compiler(), *_FLAGS, _EXPORT, *include, *sources, "-o", str(library), "-lm"]

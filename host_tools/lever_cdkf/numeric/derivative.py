@@ -49,7 +49,8 @@ def derivative_correlation(angle: Signal, rate: Signal) -> float:
 
 def derivative_ratio(angle: Signal, rate: Signal) -> float:
     """Return a rate as a multiple of the slope of the angle, negative where their signs differ; 0 where they are not
-    alike."""
+    alike.
+    """
     slope, value = _slope_and_rate(angle, rate)
     likeness = _likeness(slope, value)
     return float(np.sign(likeness) * np.std(value) / np.std(slope)) if abs(likeness) > _ALIKE else 0.0

@@ -37,7 +37,8 @@ class Columns:
         absent: tuple[str, ...] = (),
     ) -> None:
         """`watched`: whether the estimator knows the aircraft; `rated`: whether it sends test ratios; `absent`: faults
-        that say only that an input is missing which the mapping does not have."""
+        that say only that an input is missing which the mapping does not have.
+        """
         self._timeline = timeline
         self._absent = sum(bit for bit, name in enum_names("lever_fault").items() if name in absent)
         optional = (*(STABILITY if watched else ()), *(TEST_RATIO if rated else ()))
@@ -50,7 +51,8 @@ class Columns:
 
     def of(self, rows: Rows) -> Trace:
         """Return the columns of trace.csv without truth; with those of a recorded estimator, if there is one, at the
-        end."""
+        end.
+        """
         decoded = _Decoded(rows)
         trace: Trace = {"time_s": self._timeline.seconds(rows["time_us"], decoded.fields("BASE_SAMPLE")["time_us"])}
         for column, message, field in (*MEASURED, *ESTIMATED):
@@ -130,7 +132,8 @@ class _Decoded:
 
     def held(self, message: str, field: str, continued: Continued | None = None) -> FloatArray:
         """NaN before the first. Decodes only the rows with which the message came, and the first; what `continued`
-        makes of the values there is held."""
+        makes of the values there is held.
+        """
         if message not in self._held:
             slot = self._slots[message]
             fresh = (self._rows["fresh"] >> slot) & 1 != 0

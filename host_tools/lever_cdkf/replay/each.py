@@ -66,7 +66,8 @@ def replay_each(
     logs: Sequence[str], options_of: Callable[[str], Options], out: Path | None, progress: Progress | None = None
 ) -> list[Replayed]:
     """Replay each log; with `out`, its files are in a folder of it that is called as the log is. What is wrong with
-    a log is its row's `problem`, and the others go on."""
+    a log is its row's `problem`, and the others go on.
+    """
     replays = []
     for log, folder in zip(logs, _folders(logs), strict=True):
         each = Replayed(log)
@@ -88,7 +89,8 @@ def rows_of(replays: Sequence[Replayed]) -> list[Row]:
 
 def write(replays: Sequence[Replayed], out: Path, inputs: Sequence[str]) -> list[str]:
     """Write the page and the table, as far as their extras are installed; return their names. `inputs` are files
-    beside the logs. Raise LeverError."""
+    beside the logs. Raise LeverError.
+    """
     logs = [each.log for each in replays]
     origin = provenance([*logs, *inputs])
     names = [name for name, extra in ((PAGE, "report"), (TABLE, "files")) if not missing(extra)]

@@ -83,7 +83,8 @@ def replay(
 ) -> ReplaySummary:
     """Replays logs, one after another in time, and return what summary.json says; with `out_dir` also writes bus.log,
     the signals, report.html (with the extra `report`) and summary.json there, all or none, and hands the trace,
-    reduced, to `keep`. Raise LeverError, also rather than write over a log."""
+    reduced, to `keep`. Raise LeverError, also rather than write over a log.
+    """
     logs = list(logs)
     traffic: EstimatorFrames | MappedFrames
     if options.reading is None:

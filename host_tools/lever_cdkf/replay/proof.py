@@ -47,7 +47,8 @@ class Proof:
 
     def pieces(self, frames: Frames, last: bool = False) -> Iterator[tuple[Frames, Snapshot | None]]:
         """Yield the frames to feed, in pieces; the estimator has the state of the snapshot, if there is one, after
-        its piece. Some are held back until the next call, or the `last`."""
+        its piece. Some are held back until the next call, or the `last`.
+        """
         held = frames if self._held is None else np.concatenate((self._held, frames))
         self._held = held
         found = snapshots.find(held)
@@ -112,7 +113,8 @@ class Proof:
 
     def _start(self, held: Frames, found: list[Snapshot], places: list[int | None]) -> int:
         """Where to begin: with the log, or after the sample of the first whole snapshot, if the log is not of the
-        flight from its start."""
+        flight from its start.
+        """
         for snapshot, place in zip(found, places, strict=True):
             if snapshot.state is None or place is None or not self._is_comparable(snapshot):
                 continue

@@ -30,7 +30,8 @@ def write_report(
     story: Story | None = None,
 ) -> None:
     """Write the page. `trace` has the columns of trace.csv, of which only time_s is indispensable; `summary` is that
-    of summary.json, where there is one. Raise LeverError when `path` cannot be written."""
+    of summary.json, where there is one. Raise LeverError when `path` cannot be written.
+    """
     from .run import Run  # here, so that importing this package stays quick
 
     write_page(Run(trace, summary), path, story)

@@ -67,7 +67,8 @@ _TRANSFERS: Mapping[str, Callable[[Lever, Array, Array], Transfer]] = {
 
 def magnitude_and_phase(response: ComplexArray) -> tuple[Array, Array]:
     """Return the magnitude and phase of a response over frequency. The phase [deg] goes on downwards, from -180
-    where the lever moves against the floor at first (the arm's weight does so), from 0 where it moves along."""
+    where the lever moves against the floor at first (the arm's weight does so), from 0 where it moves along.
+    """
     start = -180.0 if response[0].real < 0.0 else 0.0
     along = response if start == 0.0 else -response
     return np.abs(response), np.degrees(np.unwrap(np.angle(along))) + start
@@ -75,7 +76,8 @@ def magnitude_and_phase(response: ComplexArray) -> tuple[Array, Array]:
 
 def slow_trim(time: Array, theta: Array, corner: float, longest_step: float = LONGEST_STEP) -> Array:
     """Return the estimator's own idea of the trim angle [rad]: the slow part of θ, held over gaps (NaN); corner
-    [Hz]."""
+    [Hz].
+    """
     trim = np.empty(len(theta))
     measured = theta[np.isfinite(theta)]
     level = Detrend(float(measured[0]) if measured.size else 0.0)

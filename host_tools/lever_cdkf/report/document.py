@@ -14,7 +14,8 @@ from .figure import Spec
 
 def document(title: str, body: str, figures: Mapping[str, Spec], style: str = "") -> str:
     """Return the whole page. `title` is text, `body` HTML; `figures` are drawn where an element has their key as id;
-    `style` is CSS beyond page.css."""
+    `style` is CSS beyond page.css.
+    """
     require("report")
     import plotly.offline
 

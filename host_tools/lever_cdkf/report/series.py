@@ -52,7 +52,8 @@ def envelope(time: Array, values: Array, buckets: int = 1000) -> tuple[Array, Ar
 
 def jumps(time: Array, columns: list[Array], relative: float = 0.02, apart: float = 0.05) -> list[float]:
     """Return times [s] at which a column steps by more than `relative` in one sample; steps closer than `apart` are
-    one."""
+    one.
+    """
     if len(time) < 2:
         return []
     stepped = np.zeros(len(time) - 1, dtype=bool)

@@ -73,7 +73,8 @@ def verdict(run: Run) -> str:
 
 def _headline(run: Run) -> str:
     """Return the headline of the natural frequency: how well it was estimated, or, where its truth is not known,
-    what it was at the end."""
+    what it was at the end.
+    """
     quantity = DYNAMICS[0]
     figures = figures_of(run, quantity)
     if figures and figures.rms_percent is not None:

@@ -49,7 +49,8 @@ class Coherence:
 
     def spectrum(self) -> tuple[FloatArray, FloatArray]:
         """Return frequencies [Hz] and coherence [1]; NaN where a signal has no power, and with fewer than two
-        windows."""
+        windows.
+        """
         frequency: FloatArray = np.fft.rfftfreq(self._length, self._period).astype(np.float64)
         coherence: FloatArray = np.full(len(frequency), np.nan)
         power = self._power.prod(axis=0)

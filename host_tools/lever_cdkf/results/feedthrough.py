@@ -28,7 +28,8 @@ class Feedthrough(InTurn):
 
     def at(self, time: FloatArray) -> dict[str, FloatArray]:
         """response (complex) [rad/(m/s²)], gain_sigma [1] and phase_sigma [rad], each (times, FREQUENCIES), as last
-        sent before each time [s]; NaN before the first, and where it was not available."""
+        sent before each time [s]; NaN before the first, and where it was not available.
+        """
         latest = self.latest(time)
         return {
             "response": latest[..., 0] + 1j * latest[..., 1],

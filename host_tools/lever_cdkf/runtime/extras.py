@@ -33,7 +33,8 @@ _FILES = {
 
 def missing(extra: str, *packages: str) -> str:
     """Return which packages of an extra, or of these alone, are not installed, and how to get them; empty if all
-    are."""
+    are.
+    """
     needed = packages or PACKAGES[extra]
     if "asammdf" in needed:
         reveal_mf4()

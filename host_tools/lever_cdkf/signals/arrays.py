@@ -16,7 +16,8 @@ from .units import KINDS, normal, split_name
 
 def columns_of(data: Any) -> Columns:
     """Return values and unit of each column of a pandas or polars frame, an xarray Dataset, a structured array, or a
-    mapping of arrays; an index or coordinate with a name, or of times, is a column too. Raise LeverError."""
+    mapping of arrays; an index or coordinate with a name, or of times, is a column too. Raise LeverError.
+    """
     raw: dict[str, Any]
     if hasattr(data, "data_vars"):  # xarray
         raw = {str(name): each for name, each in data.variables.items()}

@@ -51,7 +51,8 @@ def load_database(path: str | Path) -> Database:
 
 def _encoding(path: Path) -> str | None:
     """Return the encoding of a DBC, which does not say it: UTF-8 where it is that, else what cantools takes for its
-    format."""
+    format.
+    """
     if path.suffix.lower() != ".dbc":
         return None
     try:

@@ -88,7 +88,8 @@ class Mapping:
 
 def read_mapping(entries: Iterable[str]) -> Mapping:
     """Return a mapping of KEY=SIGNAL[,OPTION=VALUE…] and of .toml files, later ones over earlier ones. Raises
-    LeverError."""
+    LeverError.
+    """
     sources: dict[str, Source] = {}
     protected: dict[str, Protection] = {}
     time: str | None = None

@@ -28,7 +28,8 @@ _TICKS = 5
 
 def sparkline(signal: Signal, width: int) -> str:
     """Return the means of `width` equal parts of its time, from least to greatest as eight heights; blank where none
-    is."""
+    is.
+    """
     values = _parts(signal, width)[1]
     present = values[np.isfinite(values)]
     if not len(present):
@@ -120,7 +121,8 @@ def _page(signals: Sequence[tuple[str, Signal]], title: str) -> str:
 
 def _svg(signal: Signal, begin: float, end: float) -> str:
     """Over the time of all, from `begin` to `end` [s], which is counted from `begin`: in each part of it the range
-    that the values cover."""
+    that the values cover.
+    """
     time, lows, highs = _ranges(signal, _points(signal, _POINTS))
     present = np.isfinite(lows)
     low = float(lows[present].min()) if present.any() else 0.0

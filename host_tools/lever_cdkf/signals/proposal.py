@@ -103,7 +103,8 @@ class Candidate:
 
 def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candidate]]:
     """Return the mapping, and the candidates that it is made of. Raise LeverError where there is none for lever or
-    base."""
+    base.
+    """
     moving = [signal for signal in signals if _moves(signal.values) and signal.period < 0.5]
     candidates = [_candidate(key, signal) for signal in moving for key in INPUTS]
     candidates = _with_movement(_with_slopes([each for each in candidates if each.score > _HOPELESS]))
@@ -144,7 +145,8 @@ def _source(each: Candidate, chosen: dict[str, Candidate], unit: str) -> Source:
 
 def _unit(each: Candidate, chosen: dict[str, Candidate]) -> tuple[str, tuple[str, ...]]:
     """Return the unit of a signal; where it has none and a replay could not tell or would be wrong, the likely one
-    and why."""
+    and why.
+    """
     if each.signal.unit:
         return each.signal.unit, ()
     if each.key == "z_ddot":

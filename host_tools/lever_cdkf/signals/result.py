@@ -119,7 +119,8 @@ class Result(Mapping[str, Estimated]):
 
     def to_parquet(self, path: str | Path) -> None:
         """Write columns() with the units as metadata of the fields, and provenance as metadata of the file. Raises
-        LeverError."""
+        LeverError.
+        """
         require("files")
         import pyarrow
         from pyarrow import parquet

@@ -129,7 +129,8 @@ def _layout(lines: list[str], path: str) -> tuple[str, bool, int]:
 
 def _first_row(lines: list[str], delimiter: str, comma: bool) -> tuple[int, int]:
     """Return how well the lines fit, 0: not at all, and which is the first of several with as many fields, mostly
-    numbers."""
+    numbers.
+    """
     rows = [_fields(line, delimiter) for line in lines]
     numbered = [[_number(each, comma) for each in row] for row in rows]
     for index, (row, values) in enumerate(zip(rows, numbered, strict=True)):

@@ -115,7 +115,8 @@ def calibrate(
     likelihood: Likelihood, assignments: Assignments, kept: Sequence[str] = (), progress: ShowProgress | None = None
 ) -> Calibration:
     """Look for all of NAMES that are not `kept`, in the parts of the log in which the arm does not change. With a
-    wrong calibration other changes are found than with the right one: it is looked for until they stay the same."""
+    wrong calibration other changes are found than with the right one: it is looked for until they stay the same.
+    """
     likelihood.leave_out_changes(assignments)
     found = _calibrate(likelihood, assignments, kept, progress)
     for _ in range(_AGAIN):
@@ -302,7 +303,8 @@ class _Fit:
 
     def _calibrated(self, at: Array, scores: Array, now: Array) -> tuple[Calibrated, ...]:
         """Return the standard deviations contain that of tau_m_gain, of which the log says nothing: as in a
-        Schmidt-Kalman filter, it is considered, not estimated."""
+        Schmidt-Kalman filter, it is considered, not estimated.
+        """
         torque_sigma, h = self._settings[f"{TORQUE_GAIN}_sigma"], _STEPS[TORQUE_GAIN]
         covariance = np.linalg.inv(self._information(scores))
         if torque_sigma > 0.0:
@@ -326,5 +328,6 @@ class _Fit:
 
 def _smaller(slopes: Sequence[Array]) -> int:
     """Return which of two differences, to either side, has the smaller sum of squares: a change of the pilot that is
-    detected on one side alone would look like information."""
+    detected on one side alone would look like information.
+    """
     return int(np.argmin([float(column @ column) for column in slopes]))

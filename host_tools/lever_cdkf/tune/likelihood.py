@@ -56,7 +56,8 @@ class Likelihood:
     def leave_out_changes(self, assignments: Assignments) -> bool:
         """Tune on those parts only in which the estimator, with these settings, finds no change of the arm. Where
         that would leave less than half of what is tuned on, all stays: then it is not the arm that changes. Returns
-        whether other parts are tuned on than before."""
+        whether other parts are tuned on than before.
+        """
         recording, before = self.recording, self.tuned_on
         changed = self.run(noise_as_set(assignments))["changed"]
         steps = np.diff(changed.astype(np.int8), prepend=0, append=0)

@@ -65,7 +65,8 @@ def read(
     reading: Reading | None = None,
 ) -> Recording:
     """Return the samples on the bus `channel` (if not given: the one that has any) from `start` on for `length`,
-    both [s] of recorded time; with `reading`, of a log that does not speak lever.dbc. Raise LeverError."""
+    both [s] of recorded time; with `reading`, of a log that does not speak lever.dbc. Raise LeverError.
+    """
     if reading is not None:
         mapped = MappedFrames(list(map(str, paths)), reading)
         return _recording(np.concatenate(list(mapped.chunks())), str(mapped.channel), ", ".join(mapped.recording.paths))

@@ -84,7 +84,8 @@ def _dot(x: float, lane: int, name: str, marker: Spec, more: Spec) -> Spec:
 
 def _innovations(page: Page, fits: Sequence[Fit]) -> tuple[str, ...]:
     """Return the innovations of the part that was held out, or, if none was, of the one that was tuned on; noise as
-    set."""
+    set.
+    """
     part = fits[-1].part
     shown = [fit for fit in fits if fit.noise == "as set" and fit.part == part]
     return (

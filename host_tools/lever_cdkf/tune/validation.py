@@ -78,7 +78,8 @@ class Gain:
 
 def fits(likelihood: Likelihood, before: Assignments, after: Assignments) -> list[Fit]:
     """Return both settings, with noise as set and, if the settings have that, estimated while running, on both
-    parts."""
+    parts.
+    """
     ways: dict[str, Mapping[str, Mapping[str, str | float]]] = {
         "as set": {"before": noise_as_set(before), "after": noise_as_set(after)}
     }

@@ -148,7 +148,8 @@ class Picture:
 
     def wrong_contract(self) -> str | None:
         """Return why what is shown may be misread: the estimator speaks another version of lever.dbc, or an unknown
-        one."""
+        one.
+        """
         contract = self.identity.contract
         if contract is not None:
             mismatch = f"contract {contract} of lever.dbc, this program {codec.contract()}: what is shown is wrong"

@@ -112,7 +112,8 @@ class Source(ABC):
 
     def command(self, values: Mapping[str, codec.Value]) -> None:
         """Send a COMMAND: the fields of the message, and of the ones before as far as they are not acknowledged;
-        those not given change nothing. Raise LeverError."""
+        those not given change nothing. Raise LeverError.
+        """
         if not self.takes_commands:
             raise LeverError(f"{self.title} takes no commands")
         self._pending, self._why_not = {**self._pending, **values}, UNANSWERED
@@ -121,7 +122,8 @@ class Source(ABC):
 
     def acknowledged(self, ack: Mapping[str, float]) -> None:
         """Take the fields of a COMMAND_ACK. What is out of sequence is not refused for good: the last sender may
-        have stopped at this counter, or a moment ago."""
+        have stopped at this counter, or a moment ago.
+        """
         result = result_of(ack)
         own = bool(self._pending) and int(ack["command_counter"]) in self._tries
         if own and result == SEQUENCE:
@@ -136,7 +138,8 @@ class Source(ABC):
 
     def keep_alive(self) -> None:
         """Repeat a COMMAND when it is time: one that is not acknowledged, or any, so that dither asked for here goes
-        on. To be called several times a second as long as somebody watches it."""
+        on. To be called several times a second as long as somebody watches it.
+        """
         if time.monotonic() - self._commanded < KEEP_ALIVE:
             return
         if not self._pending:
@@ -155,7 +158,8 @@ class Source(ABC):
 
     def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
         """Return what is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈
-        [rad/(m/s²)] at the frequencies [Hz]. None where that is not known."""
+        [rad/(m/s²)] at the frequencies [Hz]. None where that is not known.
+        """
         return None
 
     def _send(self, values: Mapping[str, codec.Value]) -> int:
@@ -206,7 +210,8 @@ class BusSource(Source):
 
     def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
         """Return what is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈
-        [rad/(m/s²)] at the frequencies [Hz]. None where that is not known."""
+        [rad/(m/s²)] at the frequencies [Hz]. None where that is not known.
+        """
         return None
 
     def _transmit(self, identifier: int, data: bytes) -> None:
@@ -270,7 +275,8 @@ class LogSource(Source):
 
     def _frames(self) -> Iterator[tuple[float, Frame]]:
         """Yield each frame with the time after the one before it [s]; a clock that went back or jumped far counts as
-        0."""
+        0.
+        """
         from ..can.bulk import ERROR as ERROR_FRAME
 
         last: int | None = None

@@ -33,7 +33,8 @@ class Excerpt:
 
     def chart(self, sigmas: float, moments: Iterable[float]) -> Figure:
         """Return the estimate with a band of so many standard deviations, over time; dots at the foot where it is
-        flagged, and lines at the moments [s]."""
+        flagged, and lines at the moments [s].
+        """
         floor, ceiling = self._limits()
         figure = Figure(
             [axis(TITLES[self.quantity], range=[floor, ceiling])], time_axis(float(self.time[-1])), height=260

@@ -64,7 +64,8 @@ MOST_MODES = 3
 @dataclass(frozen=True, kw_only=True)
 class Mode:
     """[[mode]]: a bending mode of the fuselage. Amplitudes are relative to the heave that the same force at the rotor
-    makes of the rigid aircraft: its modal mass is the aircraft's mass, or the amplitudes are scaled so that it is."""
+    makes of the rigid aircraft: its modal mass is the aircraft's mass, or the amplitudes are scaled so that it is.
+    """
 
     frequency: float = quantity("Hz", above=0.0, greatest=50.0)
     damping: float = quantity("1", 0.03, above=0.0, greatest=1.0)
@@ -94,7 +95,8 @@ class Aircraft(ABC):
     @abstractmethod
     def mounted(self) -> StateSpace:
         """Return the airframe: inputs theta_c [rad] and gust [m/s^2], outputs z_ddot at the seat and at the
-        accelerometer."""
+        accelerometer.
+        """
 
     @property
     def has_actuator(self) -> bool:
@@ -110,7 +112,8 @@ class Aircraft(ABC):
 
     def response(self, s: ComplexArray, place: int = SEAT) -> ComplexArray:
         """z_ddot at one of the places / delta [m/s^2 per rad] at the complex frequencies s [rad/s], for a gearing of 1,
-        without limits."""
+        without limits.
+        """
         response = self.airframe().response(s, place, PITCH)
         if self.has_actuator:
             response = response / (1.0 + s / (2.0 * np.pi * self.actuator_bandwidth))
@@ -189,7 +192,8 @@ class FromFile(Aircraft):
 @dataclass(frozen=True, kw_only=True)
 class Imported(FromFile):
     """An airframe from a file: state_space.py. Numbers of inputs and outputs count from 1; 0: the first and the second
-    of a file that has no more."""
+    of a file that has no more.
+    """
 
     input: str = choice("blade", "actuator", default="blade")
     """What the collective input is: pitch of the blades, or the command of an actuator that is in the file."""
@@ -204,7 +208,8 @@ class Imported(FromFile):
 
     def picked(self, whole_system: StateSpace, where: str) -> StateSpace:
         """Return two inputs and two outputs of all that a file has. Without a gust there, it accelerates both places
-        alike. Raise LeverError."""
+        alike. Raise LeverError.
+        """
         inputs = _chosen(
             (self.collective_input, self.gust_input), whole_system.d.shape[1], ("collective", "gust"), where
         )
@@ -254,7 +259,8 @@ FILES = (".mat", ".npz", ".csv")
 
 def load(name_or_path: str, **changes: Any) -> Aircraft:
     """Return the aircraft of that name, or in the file of that path (ending in .toml, .mat, .npz or .csv), with some
-    of its keys changed: values as they stand in a .toml file. Raise LeverError."""
+    of its keys changed: values as they stand in a .toml file. Raise LeverError.
+    """
     path, place = Path(name_or_path), Place(name_or_path)
     if path.suffix.lower() not in FILES:
         values = parse(SHELF.content(name_or_path), name_or_path)
@@ -290,7 +296,8 @@ def keys(model: str) -> list[str]:
 
 def read_aircraft(values: Any, place: Place) -> Coupled:
     """Reader of the table [aircraft] of a scenario: `model` is a name or a file, `gearing` the pitch over the lever's
-    angle, and every other key one of the aircraft's."""
+    angle, and every other key one of the aircraft's.
+    """
     if not isinstance(values, dict):
         raise place.error(f"{values!r} is not a table")
     changes = {name: value for name, value in values.items() if name not in _OF_SCENARIO}

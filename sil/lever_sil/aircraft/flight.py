@@ -25,7 +25,8 @@ class Flight:
 
     def __init__(self, coupled: Coupled, period: float, gust: FloatArray) -> None:
         """`gust`: vertical force over mass [m/s^2] at the samples, which are `period` [s] apart, no more than the
-        aircraft's delay."""
+        aircraft's delay.
+        """
         self.constants = constants = Constants.of(coupled.aircraft, period)
         self.gearing, self.gust = coupled.gearing, gust
         self._force = gust.tolist()
@@ -38,7 +39,8 @@ class Flight:
     def advance(self, delta: float, correction: float = 0.0) -> float:
         """z_ddot at the seat at the next sample [m/s^2]; `delta`: angle of the lever about its trim at this one [rad];
         `correction`: what is put out now to be added to that angle [rad], which takes a sample period and the
-        aircraft's correction_delay."""
+        aircraft's correction_delay.
+        """
         now, constants = len(self._lever), self.constants
         late = constants.correction_delay
         self._correction.append(correction)
@@ -129,7 +131,8 @@ def limited(value: float, most: float) -> float:
 def first_order_hold(a: FloatArray, b: FloatArray, step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return matrices of x and of the input at both ends of a step [s], over which the input is linear: the
     exponential of [[A, B, 0], [0, 0, 1/step], [0, 0, 0]] (van Loan 1978), by its series of a part of the step,
-    squared."""
+    squared.
+    """
     n, m = b.shape
     whole = np.zeros((n + 2 * m, n + 2 * m))
     whole[:n, :n], whole[:n, n : n + m] = a, b

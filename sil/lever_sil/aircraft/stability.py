@@ -65,7 +65,8 @@ def margins(loop: Response, band: tuple[float, float] = BAND) -> Margins:
 
 def critical_gearing(craft: Aircraft, transfer: Transfer) -> FloatArray:
     """At which the loop becomes unstable, at each time of a pilot's transfer function [1]: margins() for many times at
-    once, by a grid alone."""
+    once, by a grid alone.
+    """
     loop = _response(craft) * transfer.response(_COARSE)
     below, above = loop.imag[:, :-1], loop.imag[:, 1:]
     part = np.where(np.signbit(below) != np.signbit(above), below / (below - above + 1e-300), np.nan)
@@ -101,7 +102,8 @@ def _crossings(loop: Response, frequency: FloatArray, response: ComplexArray) ->
 
 def mode(loop: Response, guess: complex) -> complex:
     """Return the root s [rad/s] of 1 - L(s) near `guess`, by Newton's method: Re s is the growth rate, Im s the
-    frequency."""
+    frequency.
+    """
     s = guess
     for _ in range(50):
         step = 1e-6 * (1.0 + abs(s))

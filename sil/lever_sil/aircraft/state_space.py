@@ -55,7 +55,8 @@ class StateSpace:
 
     def balanced(self) -> StateSpace:
         """With states in other units, by powers of two, so that what enters each is as large as what leaves it (after
-        Osborne 1960): rounding is the same in all of them."""
+        Osborne 1960): rounding is the same in all of them.
+        """
         scale = np.ones(len(self.a))
         for _ in range(20):
             a = self.a * scale / scale[:, None]
@@ -87,7 +88,8 @@ class StateSpace:
 
     def write(self, path: Path, comment: str = "") -> None:
         """As a .mat, .npz or .csv file, whole or not at all; `comment`: lines that begin with #, of a .csv file. Raises
-        LeverError."""
+        LeverError.
+        """
         arrays = {name.upper(): value for name, value in vars(self).items()}
         kind = path.suffix.lower()
         if kind == ".csv":
@@ -211,7 +213,8 @@ _READERS = {".mat": _mat, ".npz": _npz, ".csv": _csv}
 
 def flyable(system: StateSpace, where: str) -> StateSpace:
     """Return an airframe of two inputs and two outputs, balanced and minimal. Raise LeverError where it is
-    unstable, or of another scale than a helicopter."""
+    unstable, or of another scale than a helicopter.
+    """
     system = system.balanced().minimal()
     poles = system.poles()
     worst = poles[np.argmax(poles.real)] if len(poles) else complex(-1.0)

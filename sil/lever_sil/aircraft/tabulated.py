@@ -63,7 +63,8 @@ class Tabulated:
 
     def fitted(self, gearing: float, delay: float) -> tuple[StateSpace, float]:
         """Return a state space of pitch and gust to seat and accelerometer, both of which a gust accelerates,
-        without gearing [1] and delay [s], which are in the table; and its largest relative error [1]."""
+        without gearing [1] and delay [s], which are in the table; and its largest relative error [1].
+        """
         s = 2j * np.pi * self.frequency.astype(np.complex128)
         values = self.values * np.exp(s * delay) / gearing
         fits = tuple(fit(s, each) for each in ((values,) if self.seat is None else (values, values / self.seat)))

@@ -34,7 +34,8 @@ class Fit:
 
 def fit(s: ComplexArray, values: ComplexArray, most_pairs: int = MOST_PAIRS, good: float = GOOD) -> Fit:
     """Return the fit with the fewest pairs of poles that is good at every frequency, or the best; s [rad/s] on the
-    imaginary axis."""
+    imaginary axis.
+    """
     most = max(1, min(most_pairs, (len(s) - 1) // 2))
     found: Fit | None = None
     for pairs in range(1, most + 1):

@@ -148,7 +148,8 @@ def closed_loop(
 
 class _Notes:
     """What the estimators of `width` runs say at every STRIDE-th of `count` samples, and with `response` at every
-    RESPONSE_STRIDE-th of these their feedthrough: run first."""
+    RESPONSE_STRIDE-th of these their feedthrough: run first.
+    """
 
     def __init__(self, count: int, width: int, response: bool = False) -> None:
         rows = (count - 1) // STRIDE + 1

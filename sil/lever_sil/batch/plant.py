@@ -98,7 +98,8 @@ def natural_frequency_and_damping(
 
 class BatchPlant:
     """Levers in motion, by fast/c/lanes.h: `theta` [rad] and `theta_dot` [rad/s] of each lane at the samples so far, at
-    the first at rest at the trim."""
+    the first at rest at the trim.
+    """
 
     def __init__(self, lanes: Lanes) -> None:
         h, trim = lanes.hardware, lanes.trim
@@ -138,7 +139,8 @@ class BatchPlant:
 
 def grip_force(lanes: Lanes, theta: FloatArray, theta_dot: FloatArray) -> FloatArray:
     """Return what the arm does to the lever, mean since the last sample [N]; of its weight, which the rest angle
-    balances, nothing. Process noise and disturbance act on the lever."""
+    balances, nothing. Process noise and disturbance act on the lever.
+    """
 
     def since(values: FloatArray) -> FloatArray:
         earlier = np.concatenate((values[:1], values[:-1])) if len(values) > 1 else values

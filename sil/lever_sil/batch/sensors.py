@@ -35,7 +35,8 @@ class Fault:
 @dataclass(frozen=True)
 class Sensors:
     """Measured is gain times the truth `delay` seconds ago, plus noise. A sigma [1, s] is that of a normal error that
-    each run draws anew."""
+    each run draws anew.
+    """
 
     z_ddot_gain: float = 1.0
     z_ddot_delay: float = 0.0

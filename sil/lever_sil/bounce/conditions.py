@@ -186,7 +186,8 @@ def _more(**tables: Any) -> Callable[[Plan], Plan]:
 
 def _stuck_with(name: str, factor: float) -> Callable[[Plan], Plan]:
     """Let the firmware take a parameter for so many times what it is, and the others for what they are, and
-    learns nothing."""
+    learns nothing.
+    """
 
     def spoil(plan: Plan) -> Plan:
         arm = pilots.arm(plan.seed, pilots.SLACK)

@@ -77,7 +77,8 @@ def _half_cycle(
     cabin: FloatArray, lever: FloatArray, own: list[int], before: int, now: int, response: Response
 ) -> float:
     """Return amplitude between two extrema of the cabin's acceleration; 0 if frequency or phase are not the
-    coupling's."""
+    coupling's.
+    """
     frequency = RATE / (2.0 * (now - before))
     index = int(np.searchsorted(own, now, side="right"))
     if not ROVER_BAND[0] <= frequency <= ROVER_BAND[1] or index < 2:

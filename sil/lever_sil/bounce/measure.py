@@ -103,7 +103,8 @@ def _loudness(flown: Flown) -> FloatArray:
 
 def _doubled(flown: Flown) -> float:
     """From when on the vibration is LOUD times what it was in the first ten seconds, for two seconds at least [s]; the
-    end of the flight: never. A single gust does not count."""
+    end of the flight: never. A single gust does not count.
+    """
     loudness, notes = _loudness(flown), flown.notes
     steady = float(np.median(loudness[(notes > 2.0) & (notes < 10.0)]))
     lasts = round(2.0 / (notes[1] - notes[0]))
@@ -166,7 +167,8 @@ def _detected(flown: Flown) -> Sequence[tuple[FloatArray, FloatArray, float]]:
 
 def _margins(flown: Flown) -> Figures:
     """Return how right the stated gain margin is, where one is stated and the lever does not swing by more than
-    SWUNG."""
+    SWUNG.
+    """
     every = 25
     said, true = flown.stability[::every], flown.margins(every)
     angle = np.abs(flown.theta - flown.truth.rest)
@@ -229,7 +231,8 @@ def _uncoupled(plan: Plan) -> float:
 
 def largest_gearing(craft: str, seed: int, *, mitigation: str, spoil: Spoil = _as_it_is, **changes: Any) -> Measured:
     """Up to which gearing the vibration stays below LOUD times that without the lever: in steps of a factor, finer
-    about the first at which it does not."""
+    about the first at which it does not.
+    """
     plan = spoil(_slack(craft, seed, mitigation, **changes))
     return Measured({"gearing ÷ critical": _largest_quiet(plan, LOUD * _uncoupled(plan))})
 
@@ -275,7 +278,8 @@ def cancelled(craft: str, seed: int, *, mitigation: str, **changes: Any) -> Meas
 
 def _involuntary(flown: Flown) -> tuple[FloatArray, FloatArray]:
     """Return what cabin and motor alone make of the lever's angle [rad], and what the correction leaves of that; 2
-    to 8 Hz."""
+    to 8 Hz.
+    """
     period = flown.plan.scenario.period
     quiet = Conditions(flown.z_ddot, period, 0.0, 0.0, np.random.default_rng(0))
     theta, _, _ = plants.move(flown.truth, quiet, flown.tau_m)
@@ -312,7 +316,8 @@ VOLUNTARY = 0.5
 
 def voluntary(craft: str, seed: int, *, mitigation: str, ratio: float = STABLE, **changes: Any) -> Measured:
     """Return what the mitigation makes of the pilot's own flying: his trim to the corrected angle, with it over
-    without, at so many times the critical gearing. At 0 the cabin does not answer."""
+    without, at so many times the critical gearing. At 0 the cabin does not answer.
+    """
     pilot = pilots.table(pilots.arm(seed, pilots.SLACK))
     moves = {"kind": "sinusoid", "mean": pilot["trim"], "amplitude": "2 deg", "frequency": f"{VOLUNTARY} Hz"}
     plan = geared(_slack(craft, seed, mitigation, pilot=pilot | {"trim": moves}, **changes), max(ratio, 1e-9))
@@ -361,7 +366,8 @@ _NOTHING, _NO_TORQUE = math.radians(0.005), 2e-3
 
 def faulty(craft: str, seed: int, *, mitigation: str, spoil: Callable[[Plan], Plan]) -> Measured:
     """Return how soon after a fault correction and torque are zero, and by how much the correction jumps in a
-    sample."""
+    sample.
+    """
     plan = spoil(replace(_slack(craft, seed, mitigation), duration=FAULT + 2.0, dither=0.0))
     flown = fly(raised(plan, CANCELLED_AT))
     after = flown.during(FAULT, FAULT + 2.0)
@@ -374,7 +380,8 @@ def faulty(craft: str, seed: int, *, mitigation: str, spoil: Callable[[Plan], Pl
 
 def harmful(craft: str, seed: int, *, mitigation: str, spoil: Spoil) -> Measured:
     """For how long after a fault the correction adds to the lever's motion: the corrected angle is larger than the
-    lever's, both from 2 to 8 Hz, as rms over a quarter of a second."""
+    lever's, both from 2 to 8 Hz, as rms over a quarter of a second.
+    """
     plan = spoil(replace(_slack(craft, seed, mitigation), duration=FAULT + 5.0, dither=0.0))
     flown, period = fly(raised(plan, CANCELLED_AT)), plan.scenario.period
     passed = [_in_band(angle - flown.truth.rest, period) ** 2 for angle in (flown.corrected, flown.theta)]

@@ -47,7 +47,8 @@ def measure(task: Task) -> Measured:
 
 def run(rows: Sequence[Condition], seeds: int, show: Show) -> list[BounceResult]:
     """Return the results of the rows, in their order, with so many pilots. Rows that measure the same share the
-    flights."""
+    flights.
+    """
     flown = {row.measure: row for row in reversed(rows)}
     tasks = [Task(row.name, *flight) for row in flown.values() for flight in _flights(row, seeds)]
     found = iter(in_processes(measure, tasks, os.cpu_count() or 1, show))

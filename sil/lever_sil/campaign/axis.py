@@ -41,7 +41,8 @@ def number_of(written: Written) -> tuple[float, str] | None:
 @dataclass(frozen=True, kw_only=True)
 class Axis:
     """[[vary]]: `values` are taken as they are; between the two of `range` there are `steps` in a grid, and any number
-    in other designs."""
+    in other designs.
+    """
 
     key: str = text()
     """Dotted, as for --set."""

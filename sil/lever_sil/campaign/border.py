@@ -38,7 +38,8 @@ class Border:
 
 def borders(cells: Map, failure: Failure) -> Iterator[Border]:
     """From the first cell of the x axis on, where the error or the coverage is first beyond its limit; for rows
-    without an empty cell."""
+    without an empty cell.
+    """
     rng = np.random.Generator(np.random.Philox(_SEED))
     for name, runs in cells.runs.items():
         for panel in range(len(cells.panels.values)):

@@ -108,7 +108,8 @@ def _code() -> bytes:
 
 def fingerprint(spec: Spec) -> str:
     """Return what the names of a campaign's files begin with: of the spec and of the shared libraries that make its
-    rows."""
+    rows.
+    """
     return hashlib.sha256(spec.hashed.encode() + _code()).hexdigest()[:16]
 
 

@@ -16,7 +16,8 @@ _POINT, _ORDER = 0, 1  # purposes of random numbers
 
 def point(spec: Spec, number: int) -> dict[str, Written]:
     """Return what is set at point `number` (from 0): scenario values by dotted key. In a grid the last axis goes
-    fastest."""
+    fastest.
+    """
     if spec.design == "grid":
         return _of_grid(spec, number)
     positions = _stream(spec, _POINT, number).random(len(spec.vary))

@@ -66,7 +66,8 @@ def of_run(flight: Flight, track: Track, run: int) -> Figures:
 
 def _nees(flight: Flight, track: Track, run: int) -> float | None:
     """Return mean over the judged times of eᵀ P⁻¹ e of the parameters, which is 3 where the stated covariance is
-    right."""
+    right.
+    """
     if track.covariance is None or not np.isfinite(flight.truth[:, :PARAMETERS]).all():
         return None
     truth: Array = flight.truth[:, :PARAMETERS]

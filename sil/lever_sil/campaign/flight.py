@@ -50,7 +50,8 @@ class Flight:
 
 def simulate(scenario: Scenario, every: float, *, measured: bool) -> Flight:
     """Return a flight, looked at `every` so many seconds; with what was measured if that is asked for. Raises
-    LeverError."""
+    LeverError.
+    """
     inputs = scenario_inputs.prepare(scenario)
     step = max(1, round(every / scenario.period))
     loop = Loop(scenario, inputs, by_frames=False, every=step)

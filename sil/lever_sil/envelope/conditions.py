@@ -224,7 +224,8 @@ _RIGHT_OR_FLAGGED = most("unflagged", 3.0)
 
 def _slipping(friction: float) -> Condition:
     """Return the pilot moves a lever that friction holds in between: it is nothing that a model of the firmware
-    does."""
+    does.
+    """
     title = f"friction of {friction:g} N m, through which the pilot moves the lever, 3° rms"
     also = ("unflagged", "silent")
     return Condition(f"friction_{friction:g}", title, Motion(friction=friction, wander=3.0), also=also, start=2.0)

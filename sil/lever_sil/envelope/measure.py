@@ -178,7 +178,8 @@ def _back(outcome: Outcome) -> Values:
 
 def _learnt(within: float, outcome: Outcome) -> Values:
     """Return greatest change of a parameter in an event, `within` seconds after its begin, in its standard
-    deviations."""
+    deviations.
+    """
     changes = [np.zeros(outcome.track.faults.shape[1])]
     for start, end in outcome.events:
         inside = outcome.during(start + within + _PENDING, end)

@@ -90,7 +90,8 @@ class Loop:
         self, scenario: Scenario, inputs: Inputs, *, by_frames: bool, every: int, estimator: Estimator | None = None
     ) -> None:
         """`every`: of how many samples one has its estimate kept. `estimator`: goes on from where it is, without the
-        reset that a run begins with."""
+        reset that a run begins with.
+        """
         if not plants.has(inputs.truth):
             raise LeverError(f"a pilot of model {inputs.truth.model} runs in Python only: use run.runner.simulate()")
         self._scenario, self._inputs = scenario, inputs
@@ -168,7 +169,8 @@ class Loop:
 
     def watch(self, aircraft: AircraftResponse | None) -> NDArray[Any]:
         """Return the firmware watches the loop with this aircraft, where there is one; return what is kept of that:
-        lever_stability_t."""
+        lever_stability_t.
+        """
         self._estimator.watch(aircraft)
         kept = np.zeros(len(self._healths), struct_dtype("lever_stability_t"))
         self.struct.pointer.stability = self.struct.array("struct lever_stability", kept, kept.dtype)

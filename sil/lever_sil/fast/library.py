@@ -21,7 +21,8 @@ class Struct:
 
     def array(self, ctype: str, values: NDArray[Any], dtype: Any) -> Any:
         """Return a pointer to the values, for a field of the struct: a copy of them only where they are not as C has
-        them."""
+        them.
+        """
         contiguous = np.ascontiguousarray(values, dtype)
         return self.keep(ffi.from_buffer(f"{ctype}[]", contiguous))
 

@@ -43,7 +43,8 @@ def outside(truth: Truth) -> float:
 
 def fill(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> None:
     """Put a truth at rest, and what acts on it, into a plant_t in a struct. Where z_ddot comes to be known on the
-    way, it is what is felt()."""
+    way, it is what is felt().
+    """
     if isinstance(truth, linear_plant.LinearTruth) and conditions.ahead > 1:
         conditions = truth.felt(conditions)
     last = len(conditions.z_ddot) - 1

@@ -307,7 +307,8 @@ def stale(message: str) -> Fault:
 
 def foreign_load() -> Fault:
     """Return frames of other identifiers, among them those that the firmware itself sends, as many as the bus can
-    carry."""
+    carry.
+    """
 
     def spoil(bus: Bus, time: Interval) -> None:
         inputs = [codec.message(name).frame_id for name in (*SAMPLES, "COMMAND", "IDENTITY")]

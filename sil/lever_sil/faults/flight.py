@@ -76,7 +76,8 @@ class Pilot:
         frozen: bool = False,
     ) -> Record:
         """Return a flight with faults in a time [s]; `grip`: there is a sensor of the grip force; `frozen`: the
-        parameters are held from FREEZE on."""
+        parameters are held from FREEZE on.
+        """
         sent, read = self._right(grip)
         if frozen:
             bus.freeze(sent, FREEZE)

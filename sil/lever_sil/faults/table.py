@@ -94,7 +94,8 @@ def rows(results: Sequence[RowResult]) -> list[dict[str, Any]]:
 
 def counts(results: Sequence[RowResult]) -> dict[str, int]:
     """Return how many rows there are, how many miss what they must, how many of these are not known to, and in how
-    many the firmware was silently wrong."""
+    many the firmware was silently wrong.
+    """
     return {
         "count": len(results),
         "missed": sum(bool(result.broken) for result in results),

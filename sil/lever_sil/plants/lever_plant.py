@@ -72,7 +72,8 @@ class Lever:
 @dataclass(frozen=True)
 class Truth:
     """The pilot at every sample: arrays of equal length [kg, N s/m, N/m, rad]; 0, 0, 0 while the hands are
-    off the lever. Fixed preload does not use the trim."""
+    off the lever. Fixed preload does not use the trim.
+    """
 
     m_p: FloatArray
     c_p: FloatArray
@@ -92,7 +93,8 @@ def moment(lever: Lever, truth: Truth) -> FloatArray:
 
 def preload(lever: Lever, truth: Truth, kind: Preload) -> tuple[FloatArray, FloatArray]:
     """Return (torque by which arm's preload and weight turn the lever, per cosine [N m]; theta_l): l^2 k_p sin
-    theta_a - g l mu."""
+    theta_a - g l mu.
+    """
     arm = lever.lever_length**2 * truth.k_p
     if kind == "trim":
         return arm * np.sin(truth.trim), truth.trim
@@ -122,7 +124,8 @@ def damping(lever: Lever, truth: Truth, angle: FloatArray) -> FloatArray:
 
 def equilibrium(lever: Lever, truth: Truth, kind: Preload) -> FloatArray:
     """Return the angle at which the lever rests [rad]: the trim, or with fixed preload where springs and weight
-    balance."""
+    balance.
+    """
     if kind == "trim":
         return truth.trim
     hold, lever_angle = preload(lever, truth, kind)
@@ -237,7 +240,8 @@ class LeverPlant:
 
     def advance(self, command: float, reflex: float = 0.0) -> None:
         """To the next sample, with the torque `command` and one of the arm [N m] held. Raise StopIteration after the
-        last sample."""
+        last sample.
+        """
         theta, theta_dot, torque = self.theta, self.theta_dot, self.tau_m - command
         mass, moment, arm_damping, arm_stiffness, hold, lever_angle, drive = next(self._rows)
         lever, step, lag_middle, lag = self._lever, self._step, self._lag_middle, self._lag
@@ -271,7 +275,8 @@ class LeverPlant:
         self, begin: float, begin_dot: float, drive: list[list[float]], lever_angle: float, motor: float
     ) -> float:
         """Return mean force of the hand [N] since the lever was at `begin` with the rate `begin_dot`, to second
-        order in the period."""
+        order in the period.
+        """
         lever, period = self._lever, self._step * len(drive)
         middle = 0.5 * (begin + self.theta)
         acceleration, kick, push = (sum(column) for column in zip(*drive, strict=True))

@@ -116,7 +116,8 @@ class ReflexPlant(lever_plant.LeverPlant):
 
     def advance(self, command: float, reflex: float = 0.0) -> None:
         """To the next sample, with the torques `command` and `reflex` [N m], beside its own, held. Raise StopIteration
-        after the last sample."""
+        after the last sample.
+        """
         length = self._lever.lever_length
         k_r, c_r, rest_sine = self._grip[len(self._forces)].tolist()
         height = length * (math.sin(self.theta) - rest_sine)

@@ -156,7 +156,8 @@ class Dropout:
 @dataclass(frozen=True)
 class Sensors:
     """All sensors; the defaults are the standard values: 1 mrad and 10 mrad/s of noise, a fair accelerometer and torque
-    sensor; no sensor of the grip force."""
+    sensor; no sensor of the grip force.
+    """
 
     theta: Sensor = item(read_table(Sensor), "rad", Sensor(noise=1e-3))
     theta_dot: Sensor = item(read_table(Sensor), "rad/s", Sensor(noise=1e-2))

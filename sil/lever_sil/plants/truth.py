@@ -146,7 +146,8 @@ class Truth(ABC):
     @abstractmethod
     def dynamics(self) -> Dynamics:
         """Natural frequency and damping ratio; of the mode that an observer of theta sees, where there are several. NaN
-        while the hands are off the lever."""
+        while the hands are off the lever.
+        """
 
     @abstractmethod
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
@@ -176,7 +177,8 @@ def _part(value: Any, samples: slice) -> Any:
 
 def dominant_dynamics(truth: Truth, *columns: FloatArray) -> Dynamics:
     """Return those of the dominant mode of its transfer function, worked out only where one of its `columns` has
-    changed: eigenvalues take long."""
+    changed: eigenvalues take long.
+    """
     new = np.append(True, np.any(np.diff(np.stack(columns), axis=1) != 0.0, axis=0))
     frequency, ratio = truth.transfer(np.flatnonzero(new)).dominant_mode()
     held = np.cumsum(new) - 1

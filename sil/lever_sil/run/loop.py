@@ -157,7 +157,8 @@ def run(
 
 def _rest(link: _Link, scenario: Scenario, theta: float) -> None:
     """Send samples of a lever at rest until the estimator, after a reset, is like a fresh one: up to a HEALTH, which
-    clears the faults that it has latched."""
+    clears the faults that it has latched.
+    """
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
     encode_lever, encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
     period_us = round(scenario.period * 1e6)
@@ -213,7 +214,8 @@ class _Link:
 
     def command(self, sample: int, values: Mapping[str, codec.Value]) -> None:
         """Send a COMMAND and wait until it is acknowledged. A run that has just ended may have left the sequence
-        counter anywhere, so the first COMMAND is repeated until it is in sequence. Raise LeverError."""
+        counter anywhere, so the first COMMAND is repeated until it is in sequence. Raise LeverError.
+        """
         send = self.sender("COMMAND")
         for _ in range(1 if sample else 16):
             counter = self._commander.send(values, lambda _, data: send(sample, data))
@@ -241,7 +243,8 @@ class _Link:
 
     def answer(self, sample: int) -> tuple[float, float]:
         """Take what the estimator sends for this sample, up to its STATE_ESTIMATE; return the torque that it asks
-        for and what it adds to the lever's angle."""
+        for and what it adds to the lever's angle.
+        """
         time_low = sample * self._period_us & 0xFFFF
         timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
         torque, correction = 0.0, 0.0
@@ -285,7 +288,8 @@ class _Link:
 
     def _check_settings(self) -> None:
         """Check that the settings of the bus are the scenario's: no frame carries them. Raise SettingsError when
-        they are not."""
+        they are not.
+        """
         scenario, says = self._tape.scenario, self._tape.identity.settings_crc
         if says not in (None, scenario.config.settings_crc):
             raise SettingsError(
@@ -361,7 +365,8 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
 
 def _advance(body: Body, cabin: Flight | None, inputs: Inputs) -> Callable[[int, float, float], None]:
     """Return a function that takes lever and cabin from a sample to the next, with the torque [N m] held and what is
-    added to the lever's angle [rad]."""
+    added to the lever's angle [rad].
+    """
     rest = body.theta
 
     def advance(sample: int, torque: float, correction: float) -> None:

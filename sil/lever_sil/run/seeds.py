@@ -77,7 +77,8 @@ def rms(summaries: Sequence[SimulationSummary], key: str) -> FloatArray:
 
 def coverage(summaries: Sequence[SimulationSummary], key: str) -> FloatArray:
     """Return share of the time of each run at which +-2 sigma holds the truth [%]; 0 where there is nothing to
-    judge."""
+    judge.
+    """
     values = [summary.parameters[key].coverage_2sigma for summary in summaries]
     return 100.0 * np.array([value or 0.0 for value in values])
 
@@ -100,7 +101,8 @@ def flagged(summaries: Sequence[SimulationSummary]) -> FloatArray:
 
 def missed(summaries: Sequence[SimulationSummary]) -> list[str]:
     """Return the limits that are not kept by the median of the rms errors, and by the coverage over all runs; in
-    words."""
+    words.
+    """
     keys = judged(summaries)
     return missed_limits(
         summaries[0].scenario.limits,

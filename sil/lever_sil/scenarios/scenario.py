@@ -211,7 +211,8 @@ class Scenario:
 
     def judged(self) -> tuple[quantities.Quantity, ...]:
         """Return what there is a truth of: everything, or no parameters when the pilot is not of the estimator's
-        model."""
+        model.
+        """
         model = self.config.choices["model"]
         return quantities.quantities(model) if self.pilot.model == model else quantities.DYNAMICS
 
@@ -236,7 +237,8 @@ class Scenario:
 
     def changes(self) -> tuple[float, ...]:
         """Return times [s] after which the parameters have to be found anew: the start, and every jump of one of
-        them."""
+        them.
+        """
         return (0.0, *sorted(time for time in self.pilot.changes() if 0.0 < time < self.duration))
 
     def dithers(self) -> list[tuple[float, float]]:

@@ -32,7 +32,8 @@ class Model(Protocol):
 
     def dynamics(self, p: Array, trim: float | Array) -> Array:
         """Return natural frequency [Hz] and damping ratio [1], (2, …), of parameters (3, …) about the angle `trim`
-        [rad]."""
+        [rad].
+        """
 
 
 @dataclass(frozen=True)

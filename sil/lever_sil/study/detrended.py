@@ -19,7 +19,8 @@ from .data import OUTPUTS, Batch
 
 def detrended(batch: Batch, corner: float, align_time: float) -> Batch:
     """Return the batch with y, u and trim made of raw_y and raw_u; corner [Hz], theta at first a mean of align_time
-    [s]."""
+    [s].
+    """
     signals = np.concatenate((batch.raw_y, batch.raw_u), axis=2)
     start = np.zeros((batch.runs, signals.shape[2]))
     start[:, 0] = batch.raw_y[:, : max(1, round(align_time / batch.period)), 0].mean(axis=1)

@@ -26,7 +26,8 @@ def excitation(
     rms: tuple[float, float], band: tuple[float, float], time: Array, own: dict[str, np.random.Generator]
 ) -> Array:
     """Return (K, 2) z_ddot [m/s²] and tau_m [N m] of one run at the times (K,) [s]: noise of `rms` in the `band`
-    [Hz]."""
+    [Hz].
+    """
     low, high = band
     sources = zip(rms, (own["base"], own["dither"]), strict=True)
     return np.stack([Noise(rms=part, low=low, high=high).samples(time, rng) for part, rng in sources], axis=-1)

@@ -149,7 +149,8 @@ def jump(samples: int, moment: int, factors: Array) -> Array:
 
 def _bounds(kind: Kind) -> Array:
     """Return (3, 2) least and greatest parameters of the model, which are those that settings take for the first
-    guess."""
+    guess.
+    """
     return np.array([(setting(name).least, setting(name).greatest) for name in kind.parameters])
 
 

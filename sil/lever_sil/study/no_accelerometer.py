@@ -115,7 +115,8 @@ def likeliest(y: Array, truth: Array, spectrum: Spectrum, start: tuple[float, ..
 
 def _periodogram(y: Array, noise: Array, period: float) -> tuple[Array, Array, Array]:
     """Return frequencies [Hz]; the periodogram of theta from both outputs, weighted by their noise; its noise
-    (one-sided)."""
+    (one-sided).
+    """
     frequency = np.fft.rfftfreq(len(y), period)
     inside = (frequency >= _BAND[0]) & (frequency <= _BAND[1])
     taper = np.hanning(len(y))  # what is loud at one frequency does not leak into others

@@ -76,7 +76,8 @@ def ratio_spread(deviations: Array, variances: Array, seed: int, draws: int = 20
 
 def sigma_ratio(deviations: Array, variances: Array) -> Array:
     """Return (n,) what an estimator claims ÷ what it does: root of the mean of its variances (B, T, n) ÷ rms of its
-    errors."""
+    errors.
+    """
     return 1.0 / ratio(deviations, variances)
 
 

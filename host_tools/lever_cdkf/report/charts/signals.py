@@ -84,7 +84,8 @@ def _stretches(run: Run, seconds: float) -> dict[str, float]:
 
 def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
     """Return normalised innovation squared per output, averaged over short stretches, and the band that chance alone
-    gives."""
+    gives.
+    """
     averages = run.innovations(seconds)
     if averages is None or not (filled := averages.freedom > 0).any():
         return None

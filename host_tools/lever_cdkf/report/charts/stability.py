@@ -41,7 +41,8 @@ def accuracy(run: Run) -> Accuracy | None:
 
 def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
     """Return gain margin, frequency and correction over time, and when there is warning or alarm; `limits` [dB] of
-    these."""
+    these.
+    """
     gain, sigma, state = (run.column(name) for name in ("gain_margin_dB", "gain_margin_sigma_dB", "bounce"))
     frequency = run.column("bounce_frequency_Hz")
     if gain is None or sigma is None or state is None or frequency is None:

@@ -31,7 +31,8 @@ def followed(
     centre: Mapping[str, float] | None = None,
 ) -> Estimates:
     """recursion.follow() of a FILTER_ of c/filters.h, or of the class that it stands for, which `reference` makes. With
-    `centre`: reach and weights of sigma points."""
+    `centre`: reach and weights of sigma points.
+    """
     if type(batch.model) not in _MODELS or batch.missing is not None:
         return follow(reference(batch), at)
     runs = [_run(kind, batch, run, at, steps, centre or {}) for run in range(batch.runs)]

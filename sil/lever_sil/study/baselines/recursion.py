@@ -99,7 +99,8 @@ class Slopes:
 
     def move(self, k: int, x: Array, w: Array) -> tuple[Array, Array, Array]:
         """Return states (B, 2) at sample k + 1 of x (B, 2) at sample k with w (B, 3); dx⁺/dx (B, 2, 2), dx⁺/dw (B,
-        2, 3)."""
+        2, 3).
+        """
         moved = self._batch.move(k, x[:, np.newaxis] + self._x, w[:, np.newaxis] + self._w)
         half = STATES + PARAMETERS + 1
         slopes = transposed((moved[:, 1:half] - moved[:, half:]) / (2.0 * DIFFERENCE))

@@ -109,7 +109,8 @@ def _high_pass(values: Array, corner: float, dt: float) -> Array:
 
 def _variance(batch: Batch, n: int) -> float:
     """Return the variance of the difference of neighbouring means of n samples of theta_dot, by n dt: of white noise
-    and a random walk."""
+    and a random walk.
+    """
     white = 2.0 * float(batch.knowledge.output_noise[1]) ** 2 / n
     walk = batch.knowledge.process_noise**2 * batch.period * (2 * n**2 + 1) / (3 * n)
     return (white + walk) / (n * batch.period) ** 2

@@ -201,7 +201,8 @@ class Stepped(Case):
 class Paper(Case):
     """The experiment of the paper (../PAPER.md): parameters that stay, drift or jump, under two levels of noise in each
     channel. Whatever they do, estimators are told the same walk. Errors are judged from 10 s on, and after a jump of
-    damping and stiffness in the middle from 5 s after it on."""
+    damping and stiffness in the middle from 5 s after it on.
+    """
 
     kind: str = "paper"
     duration: float = 40.0
@@ -254,7 +255,8 @@ class Paper(Case):
 class Protocol(Paper):
     """What others have tried time-varying estimators on (../PAPER.md), on the lever: `truth` is "constant", "jump",
     "slow" (damping and stiffness rise as in the jump, within half of the run) or "square wave" (stiffness alone, 5 s
-    high and 5 s low from 10 s on). The remnant is process noise."""
+    high and 5 s low from 10 s on). The remnant is process noise.
+    """
 
     kind: str = "protocol"
     output_noise: float = 1.0

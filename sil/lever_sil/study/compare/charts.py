@@ -134,7 +134,8 @@ def _vertical(at: float, colour: str = "mark") -> Spec:
 
 def settling(results: Results, case: str) -> Figure | None:
     """Return the settling of each run, when the natural frequency was found for good; hollow at the right end:
-    never."""
+    never.
+    """
     change, names = cases()[case].change(results.plan), _present(results, case)
     if change is None or not names:
         return None
@@ -154,7 +155,8 @@ def settling(results: Results, case: str) -> Figure | None:
 
 def following(results: Results, case: str) -> Figure | None:
     """Return the error of the natural frequency about the step: median over runs, and of the first of ours the
-    middle half."""
+    middle half.
+    """
     change, names = cases()[case].change(results.plan), _present(results, case)
     if change is None or not names:
         return None

@@ -94,7 +94,8 @@ def _difference(more: float, error: float, runs: int, counted: float) -> Differe
 
 def of_errors(case: str, squares: Mapping[str, Array], reference: str | None = None) -> Differences:
     """Return the of errors of the geometric mean over quantities of rms errors; mean squares (B, n) of each run by
-    name of estimator."""
+    name of estimator.
+    """
     together = np.stack(list(squares.values()), axis=1)
 
     def logarithms(rows: Array, axis: int) -> Array:

@@ -205,7 +205,8 @@ def compare(results: Results, rows: list[Row]) -> tuple[Differences, Differences
 
 def _times(results: Results, case: str, names: list[str], change: float) -> Mapping[str, Array]:
     """Return (B,) settling times [s]; never counts as the time that was left, at once as the time between two
-    estimates."""
+    estimates.
+    """
     by_name = {}
     for name in names:
         outcome = results.outcomes[case, name]

@@ -42,7 +42,8 @@ def names() -> list[str]:
 
 def tables(results: Results) -> dict[str, list[Row]]:
     """Return a table for each model, a row for each truth and estimator; a cell is median / worst of runs and levels of
-    noise."""
+    noise.
+    """
     by_title: dict[str, list[Row]] = {}
     for (model, truth, estimator), figures in _gathered(results).items():
         by_title.setdefault(f"{model}, {results.plan.seeds} seeds", []).append(

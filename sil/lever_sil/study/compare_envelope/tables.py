@@ -63,7 +63,8 @@ def rows(results: Sequence[EstimatorResult]) -> list[Row]:
 
 def differences(results: Sequence[EstimatorResult]) -> Differences:
     """Return the differences of the joint filters' errors against the firmware's in each condition; without those that
-    broke down in a run."""
+    broke down in a run.
+    """
     compared: Differences = {}
     for condition, group in groupby(results, key=lambda result: result.condition):
         squares = {one.estimator: np.square(one.rms)[:, np.newaxis] for one in group if np.isfinite(one.rms).all()}

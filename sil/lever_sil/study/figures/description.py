@@ -144,7 +144,8 @@ class Figure:
 
     def limits(self) -> list[tuple[float, float]]:
         """Return the limits of the y axes, row by row: what any column says, or all that is drawn from `scaled_from`
-        on, and a margin."""
+        on, and a margin.
+        """
         columns = [column.content for column in self.columns if not isinstance(column.content, Surface)]
         since = max(self.x_range[0], self.scaled_from)
         return [rows[0].limits or _limits(rows, since) for rows in zip(*columns, strict=True)]
