@@ -53,7 +53,7 @@ def is_flagged(faults: NDArray[Any], mask: int) -> BoolArray:
 
 
 def longest(true: BoolArray) -> int:
-    """Return the most in a row (T,)."""
+    """Return how many of `true` (T,) are true in a row, at most."""
     return max((last - first + 1 for first, last in runs(true)), default=0)
 
 

@@ -42,8 +42,9 @@ def _pieces_of_hex(text: str) -> Iterator[tuple[int, bytes]]:
 
 
 def flash_contents(path: Path) -> bytes:
-    """Return what `path` (.elf, .hex, .bin) puts into flash. Raise LeverError, also when it is not a whole image of
-    ours.
+    """Return what `path` (.elf, .hex, .bin) puts into flash.
+
+    Raise LeverError, also when it is not a whole image of ours.
 
     The build ends an image with the CRC-32 of all before it (firmware/port/stm32f4/rom_crc.py), which is checked here.
     """

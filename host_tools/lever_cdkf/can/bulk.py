@@ -117,7 +117,9 @@ class Feeder:
         return int(self._feeder.refused)
 
     def feed(self, frames: Frames) -> Iterator[tuple[Frames, Rows]]:
-        """Feed the frames of one bus, all classic data frames with 11-bit identifiers, and yield pieces of
+        """Feed the frames of one bus, all classic data frames with 11-bit identifiers, and yield pieces of them.
+
+        A piece holds
 
         - the frames fed, each followed by its answers (flag ANSWER), valid until the next piece, and
         - the rows of the samples that are complete with it; the last one is kept back until flush().

@@ -62,7 +62,8 @@ class LeverBus(BusABC):
         rx_queue_size: int = 65536,
         **kwargs: Any,
     ) -> None:
-        """
+        """Start the firmware in this process, as a bus.
+
         :param channel: a name for logs
         :param config: configuration of the firmware; its defaults if neither this nor `settings` is given
         :param settings: instead of `config`: settings and choices by name, or the path of a settings file

@@ -37,8 +37,9 @@ def add_bus_options(parser: argparse.ArgumentParser) -> None:
 
 
 def chosen_options(args: argparse.Namespace, *, fd: bool = False) -> dict[str, Any]:
-    """Return options for open_bus(), numbers and truth values as such; with `fd` of a bus with CAN FD, which other
-    interfaces than SocketCAN need more options for. Raise LeverError.
+    """Return options for open_bus(), numbers and truth values as such; raise LeverError.
+
+    With `fd` they are of a bus with CAN FD, which other interfaces than SocketCAN need more options for.
     """
     from can.util import cast_from_string
 
@@ -61,8 +62,9 @@ def check_others_can_be_heard(interface: str) -> None:
 
 
 def open_bus(interface: str, channel: str | None, options: Mapping[str, Any], *, translated: bool = True) -> can.BusABC:
-    """Return a python-can bus; `translated`: with the identifiers of lever.dbc, whatever they are on it. Raises
-    LeverError.
+    """Return a python-can bus; raise LeverError.
+
+    `translated`: with the identifiers of lever.dbc, whatever they are on it.
     """
     import can
 

@@ -93,8 +93,9 @@ def check(identifier: int, data: bytes | bytearray) -> bool:
 
 @cache
 def _crc_table() -> NDArray[np.uint8]:
-    """Return the CRC register after a byte, by register xor byte; the library starts with 0xFF and inverts at the
-    end.
+    """Return the CRC register after a byte, by register xor byte.
+
+    The library starts with 0xFF and inverts at the end.
     """
     import numpy as np
 
@@ -224,8 +225,9 @@ def _protected(word: int, identifiers: bytes) -> bytes:
 
 
 def encoder(name: str) -> Callable[..., bytes]:
-    """Return a fast encoder of a message without multiplexing: counter, then each value in the order of the DBC, to 8
-    bytes.
+    """Return a fast encoder of a message without multiplexing: counter, then each value in the order of the DBC.
+
+    It makes 8 bytes.
 
     encoder("LEVER_SAMPLE") takes (counter, theta, theta_dot, tau_m), encoder("BASE_SAMPLE") (counter, z_ddot, time_us).
     """
@@ -246,8 +248,9 @@ def encoder(name: str) -> Callable[..., bytes]:
 
 
 def encode_columns(name: str, counters: NDArray[np.int64], values: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:
-    """Encode N frames at once, as encoder() does, into (N, 8) bytes: all fields of a message without multiplexing,
-    by name.
+    """Encode N frames at once, as encoder() does, into (N, 8) bytes.
+
+    `values` are all fields of a message without multiplexing, by name.
     """
     import numpy as np
 
@@ -304,8 +307,9 @@ def encode(name: str, counter: int, values: Mapping[str, Value]) -> bytes:
 
 
 def decode(identifier: int, data: bytes | bytearray) -> tuple[str, dict[str, float]]:
-    """Return name and fields of a received frame, choices as numbers, NaN for what is not available. Raises
-    CodecError if it is not in the DBC or corrupt.
+    """Return name and fields of a received frame, choices as numbers, NaN for what is not available.
+
+    Raise CodecError if it is not in the DBC or corrupt.
     """
     definition = message(identifier)
     if not check(identifier, data):

@@ -43,8 +43,9 @@ class EstimatorFrames:
     def __init__(
         self, recording: Recording, channel: str | None = None, start: float = 0.0, length: float = float("inf")
     ) -> None:
-        """`channel`: the bus with the samples; by default the only one that has any. `start` and `length` [s] of
-        recorded time say which part is read; COMMAND frames before it belong to it.
+        """Read the bus `channel`; by default the only one that has any samples.
+
+        `start` and `length` [s] of recorded time say which part is read; COMMAND frames before it belong to it.
         """
         self.recording = recording
         self._start, self._end = start or -math.inf, start + length  # a clock that was set back belongs to the whole
@@ -69,8 +70,9 @@ class EstimatorFrames:
         self._bus: int | None = None
 
     def chunks(self) -> Iterator[Frames]:
-        """Yield the estimator's frames, inputs and recorded answers, in recorded order. Raise LogError without a
-        sample.
+        """Yield the estimator's frames, inputs and recorded answers, in recorded order.
+
+        Raise LogError without a sample.
         """
         waiting: list[Frames] = []
         for frames in self._part():
@@ -183,9 +185,10 @@ class EstimatorFrames:
 
 
 def sample_chunks(traffic: EstimatorFrames) -> Iterator[dict[str, NDArray[np.float64]]]:
-    """Yield the samples, as run_samples() takes them, a chunk at a time: time_us (continued beyond 32 bits), theta
-    [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s^2], grip_force [N]; NaN where a value is invalid or its
-    LEVER_SAMPLE or GRIP_SAMPLE is missing.
+    """Yield the samples, as run_samples() takes them, a chunk at a time.
+
+    They are time_us (continued beyond 32 bits), theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s^2], grip_force
+    [N]; NaN where a value is invalid or its LEVER_SAMPLE or GRIP_SAMPLE is missing.
 
     Corrupt frames are left out, and samples with the time of the one before. Raise LogError.
     """

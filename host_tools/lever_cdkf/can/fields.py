@@ -41,8 +41,9 @@ def columns(name: str, data: NDArray[np.uint8]) -> dict[str, NDArray[np.float64]
 
 
 def belongs(fields: dict[str, NDArray[np.float64]], time_us: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return whether each frame of columns() is of the sample with this time [us], by the low bits of it that it
-    carries.
+    """Return whether each frame of columns() is of the sample with this time [us].
+
+    It is told by the low bits of the time that the frame carries.
     """
     right: NDArray[np.bool_] = fields["time_low"] == (time_us & 0xFFFF)
     return right

@@ -1,5 +1,7 @@
-"""Where the identifiers of lever.dbc are on a bus or in a log: as they are, higher by an offset, or, with 29 bits, by a
-base; firmware/port/identifiers.h is the other end.
+"""Where the identifiers of lever.dbc are on a bus or in a log.
+
+They are there as they are, higher by an offset, or, with 29 bits, by a base; firmware/port/identifiers.h is the other
+end.
 
 The choice is that of a command line, once for the process. What opens a bus or reads a log translates by it; all else
 knows the identifiers of lever.dbc alone. A frame that is not ours gets an identifier that no message has.

@@ -47,8 +47,9 @@ class Recording:
     """One or several logs."""
 
     def __init__(self, paths: Iterable[str | os.PathLike[str]], *, translated: bool = True) -> None:
-        """Open the logs and read the first frames of each. `translated`: with the identifiers of lever.dbc, whatever
-        they were on the bus. Raise LogError.
+        """Open the logs and read the first frames of each; raise LogError.
+
+        `translated`: with the identifiers of lever.dbc, whatever they were on the bus.
         """
         self._translated = translated
         self.buses = Buses()
@@ -235,8 +236,9 @@ def _reader(path: str) -> Callable[[Recording, str], Iterator[Frames]]:
 
 
 def _is_file(path: str) -> bool:
-    """Return False for what is there but has no end known before, such as a pipe. Raise LogError for what is not
-    there.
+    """Return False for what is there but has no end known before, such as a pipe.
+
+    Raise LogError for what is not there.
     """
     try:
         mode = os.stat(path).st_mode
@@ -275,9 +277,7 @@ def _blocks(text: Any) -> Iterator[bytes]:
 
 @contextmanager
 def _open_text(path: str) -> Iterator[tuple[Any, Callable[[], int]]]:
-    """Yield the file object of a text that may be compressed, and a function that returns how many bytes have been
-    read.
-    """
+    """Yield the file object of a text that may be compressed, and a function that counts the bytes read so far."""
     if path == "-":
         with open(sys.stdin.fileno(), "rb", buffering=0, closefd=False) as file:
             yield file, lambda: 0

@@ -61,7 +61,7 @@ class _ReadAhead:
 
 
 def serial_class_for_url(url: str) -> tuple[str, type]:
-    """pyserial's hook: the URL without our scheme, and the class that opens it."""
+    """Return the URL without our scheme, and the class that opens it: a hook of pyserial."""
     inner = url[len(_SCHEME) :]
     scheme, colon, _ = inner.partition("://")
     base = importlib.import_module(f"serial.urlhandler.protocol_{scheme}").Serial if colon else serial.Serial

@@ -31,8 +31,9 @@ _TELL = 1.0
 
 
 class Recorder:
-    """The frames of a bus into `path`, which is there, complete, after run() only; until then, and when something goes
-    wrong, it is called `path`.partial.
+    """The frames of a bus into `path`, which is there, complete, after run() only.
+
+    Until then, and when something goes wrong, it is called `path`.partial.
     """
 
     def __init__(self, bus: can.BusABC, path: Path, channel: str) -> None:
@@ -138,9 +139,7 @@ class Recorder:
                 self._enter(self._bus.state.name.lower())
 
     def _take_error(self, message: can.Message) -> None:
-        """Count an error frame of SocketCAN: its identifier is a mask of classes, byte 1 the state of the
-        controller.
-        """
+        """Count an error frame of SocketCAN: its identifier is a mask of classes, byte 1 the controller's state."""
         conditions = message.data[1] if message.arbitration_id & _CONTROLLER and len(message.data) > 1 else 0
         self.overflows += bool(conditions & _RX_OVERFLOW)
         if message.arbitration_id & _BUS_OFF:

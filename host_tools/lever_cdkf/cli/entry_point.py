@@ -1,5 +1,7 @@
-"""Where the command `lever` starts: Ctrl-C ends it in one line before Python has read the rest, which takes a moment,
-and does nothing any more once all is done: while Python ends, it would be a signal that kills.
+"""Where the command `lever` starts.
+
+Ctrl-C ends it in one line before Python has read the rest, which takes a moment, and does nothing any more once all is
+done: while Python ends, it would be a signal that kills.
 
 Imports next to nothing, for the same reason.
 """

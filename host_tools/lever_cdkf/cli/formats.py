@@ -24,8 +24,9 @@ def add_format_option(parser: argparse.ArgumentParser, usual: Sequence[str]) -> 
 
 
 def chosen_formats(args: argparse.Namespace) -> tuple[str, ...]:
-    """Return what --format says; without it, says on standard error which of the usual files need an extra that is
-    missing. Raise LeverError for a format that needs one, and without --out.
+    """Return what --format says; raise LeverError for a format that needs an extra that is missing, and without --out.
+
+    Without --format, say on standard error which of the usual files need an extra that is missing.
     """
     if args.out is None:
         if args.format is not None:

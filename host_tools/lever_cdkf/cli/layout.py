@@ -13,7 +13,7 @@ _INDENT = "    "
 
 
 def terminal_width() -> int:
-    """Return columns of standard output. Without a limit where it is no terminal, so that a row is a line for `grep`.
+    """Return the columns of standard output; without a limit where it is no terminal, so that `grep` has rows as lines.
 
     The environment variable COLUMNS sets it for both.
     """

@@ -132,8 +132,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _has_streams() -> bool:
-    """Return standard error and input that are closed are as /dev/null; without a standard output nothing is worth
-    running.
+    """Return whether there is a standard output, without which nothing is worth running.
+
+    Standard error and input that are closed become as /dev/null.
     """
     for name, mode in (("stdin", "r"), ("stderr", "w")):
         if getattr(sys, name) is None:
@@ -157,7 +158,7 @@ def _check_json(args: argparse.Namespace) -> None:
 
 
 def _said(error: Exception) -> str:
-    """Return the said of an error of the system that names no file: of standard output, where it is full."""
+    """Return what is said of an error; a full disk without the name of a file is that of standard output."""
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EFBIG) and error.filename is None:
         return f"cannot write standard output: {error.strerror}"
     return str(error)

@@ -28,8 +28,9 @@ def add_json_option(parser: argparse._ActionsContainer) -> None:
 def print_tables(
     tables: Tables, json_file: str | None = None, digits: int = 4, inputs: Iterable[str | os.PathLike[str]] = ()
 ) -> None:
-    """Print the tables, numbers with so many `digits`; with `json_file` also writes them there, and that they are from
-    the files `inputs`. Raise LeverError.
+    """Print the tables, numbers with so many `digits`; raise LeverError.
+
+    With `json_file` also write them there, and that they are from the files `inputs`.
 
     On a terminal they fit its width, and a table of one row stands upright; elsewhere a row is a line.
     """

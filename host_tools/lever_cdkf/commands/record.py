@@ -84,8 +84,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _reading(args: argparse.Namespace) -> tuple[Reading | None, bool]:
-    """Return how the log will be read by others, checked before it is recorded, and whether that is CAN FD. Raises
-    LeverError.
+    """Return how the log will be read by others, checked before it is recorded, and whether that is CAN FD.
+
+    Raise LeverError.
     """
     if not (args.map or args.dbc or args.clock):
         return None, False

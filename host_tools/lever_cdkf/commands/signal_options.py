@@ -75,8 +75,9 @@ def input_files(args: argparse.Namespace) -> list[str]:
 
 
 def chosen_aircraft(text: str) -> AircraftResponse:
-    """Return the response in a file, or of NAME[,KEY=VALUE…] by the package that knows aircraft, where NAME may also
-    be a file that it reads. Raise LeverError.
+    """Return the response in a file, or of NAME[,KEY=VALUE…] by the package that knows aircraft; raise LeverError.
+
+    NAME may also be a file that the package reads.
     """
     from ..firmware.aircraft import read_response
 

@@ -256,8 +256,9 @@ def _refuse(args: argparse.Namespace, likelihood: Likelihood, calibration: Calib
 def _delay_to_mapping(
     args: argparse.Namespace, before: Assignments, after: Assignments
 ) -> tuple[Assignments, tuple[Path, str] | None]:
-    """With signals that are mapped the delay goes into the mapping, which undoes it exactly; the settings, and the path
-    and text of the mapping.
+    """Return the settings, and the path and text of the mapping.
+
+    With signals that are mapped the delay goes into the mapping, which undoes it exactly.
     """
     from dataclasses import replace
 

@@ -57,8 +57,9 @@ class Column:
     """Whether it comes at a divided rate, and the trace holds it until the next one."""
 
     def fresh(self, published: NDArray[np.bool_], recorded: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """At which samples there is a new one; `published` and `recorded` are those with new estimates of the run and
-        of the recording.
+        """Return at which samples there is a new one.
+
+        `published` and `recorded` are those with new estimates of the run and of the recording.
         """
         if not self.held:
             return np.ones(len(published), np.bool_)

@@ -55,15 +55,19 @@ _STYLE: dict[str, Any] = {
 
 
 def style() -> AbstractContextManager[None]:
-    """matplotlib's own defaults, whatever its user has configured, and the style of these figures."""
+    """Return a context with matplotlib's own defaults and the style of these figures.
+
+    The defaults hold whatever the user of matplotlib has configured.
+    """
     import matplotlib.style
 
     return matplotlib.style.context(["default", _STYLE])
 
 
 def render(figure: Figure, kind: str, title: str, provenance: Provenance | None = None, **more: Any) -> bytes:
-    """Return the file of a figure laid out in style(); `more` are further properties of its provenance. The same
-    figure gives the same bytes.
+    """Return the file of a figure laid out in style(); the same figure gives the same bytes.
+
+    `more` are further properties of its provenance.
     """
     file = io.BytesIO()
     with style():

@@ -1,5 +1,6 @@
-"""What an estimator is given of the helicopter, to tell how near collective bounce is; and as a file, which lever_can
-reads as well (firmware/port/linux/aircraft.h says what is in it).
+"""What an estimator is given of the helicopter, to tell how near collective bounce is.
+
+It is also a file, which lever_can reads as well (firmware/port/linux/aircraft.h says what is in it).
 """
 
 from __future__ import annotations
@@ -45,8 +46,9 @@ class Correction(NamedTuple):
 
 
 class SeatTransfer(NamedTuple):
-    """z_ddot at the pilot's seat over that at the accelerometer: direct + sum (by_rate s + by_place) / (s^2 + damping s
-    + stiffness), at most LEVER_SEAT_MODES of them.
+    """z_ddot at the pilot's seat over that at the accelerometer.
+
+    It is direct + sum (by_rate s + by_place) / (s^2 + damping s + stiffness), at most LEVER_SEAT_MODES of them.
     """
 
     direct: float
@@ -69,11 +71,13 @@ class AircraftResponse:
         seat: SeatTransfer | None = None,
         name: str = "an aircraft",
     ) -> None:
-        """frequency [Hz], rising; response: vertical acceleration at the pilot's seat over the lever's angle, with
+        """Take the response of an aircraft; raise LeverError.
+
+        frequency [Hz], rising; response: vertical acceleration at the pilot's seat over the lever's angle, with
         gearing, delays and actuator [(m/s²)/rad]; how well that is known: gain_sigma relative to it [1], phase_sigma
         [rad]; warning and alarm: limits of the gain margin [dB]; seat: where the accelerometer is not there, what lies
         between, and None where that is not known: then the response is that at the accelerometer; name: what it is of,
-        for people. Raises LeverError.
+        for people.
         """
         self.name = name
         most = lib.LEVER_AIRCRAFT_POINTS
@@ -97,12 +101,12 @@ class AircraftResponse:
 
     @property
     def warning(self) -> float:
-        """[dB]"""
+        """Return the gain margin below which there is a warning [dB]."""
         return round(float(self.pointer.warning), 6)
 
     @property
     def alarm(self) -> float:
-        """[dB]"""
+        """Return the gain margin below which there is an alarm [dB]."""
         return round(float(self.pointer.alarm), 6)
 
     def text(self) -> str:

@@ -91,8 +91,9 @@ class Parameter(NamedTuple):
 
 @cache
 def model_parameters(model: str) -> tuple[Parameter, ...]:
-    """Return the parameters of a model, in the order of lever_estimate_t. Raise SettingsError for a model that is
-    none.
+    """Return the parameters of a model, in the order of lever_estimate_t.
+
+    Raise SettingsError for a model that is none.
     """
     number = choice_value("lever_model", "model", model)
     return tuple(

@@ -202,8 +202,9 @@ class Estimator:
         return Feedthrough(response, raw.gain_sigma, raw.phase_sigma, raw.correlation)
 
     def test_ratios(self) -> dict[str, float]:
-        """Return each statistic that is watched for faults and changes, over its threshold [1]: above 1 it is
-        evidence.
+        """Return each statistic that is watched for faults and changes, over its threshold [1].
+
+        Above 1 it is evidence.
         """
         ratios = ffi.new("float[]", lib.LEVER_TEST_RATIOS)
         lib.lever_test_ratios(self.pointer, ratios)
@@ -235,16 +236,18 @@ class Estimator:
         return health_of(self._health)
 
     def state(self) -> bytes:
-        """Return all that its future depends on besides configuration, aircraft and what it is given; between two
-        samples.
+        """Return all that its future depends on besides configuration, aircraft and what it is given.
+
+        It is to be called between two samples.
         """
         room = ffi.new("uint8_t[]", lib.LEVER_STATE_BYTES)
         lib.lever_state_save(self.pointer, room)
         return bytes(room)
 
     def restore(self, state: bytes) -> bool:
-        """Go on from the state of an instance with the same settings; False, and unchanged, for one that is of
-        another kind.
+        """Go on from the state of an instance with the same settings.
+
+        Return False, and stay unchanged, for one that is of another kind.
         """
         return len(state) == lib.LEVER_STATE_BYTES and bool(lib.lever_state_restore(self.pointer, state))
 
@@ -264,8 +267,9 @@ class Estimator:
         return lib.lever_step(self.pointer)  # type: ignore[no-any-return]
 
     def next_frame(self) -> tuple[int, bytes] | None:
-        """Return the next frame to send, as identifier and data; None when there is none left. Fetch them after
-        every frame taken: a COMMAND is acknowledged, sample or not.
+        """Return the next frame to send, as identifier and data; None when there is none left.
+
+        Fetch them after every frame taken: a COMMAND is acknowledged, sample or not.
         """
         answer = self._answer
         if not lib.lever_next_frame(self.pointer, answer):
@@ -274,7 +278,7 @@ class Estimator:
 
 
 def state_layout() -> int:
-    """Return the state layout of the bytes of state(): those of another version of the firmware have another one."""
+    """Return the layout of the bytes of state(): those of another version of the firmware have another one."""
     return int(lib.lever_state_layout())
 
 
@@ -288,8 +292,9 @@ class Recorder:
         self._frame = ffi.new("lever_frame_t *")
 
     def frames(self) -> Iterator[tuple[int, bytes]]:
-        """Yield those to send now: after a step all of whose frames have been fetched, before the next frame is
-        taken.
+        """Yield the frames to send now.
+
+        To be called after a step all of whose frames have been fetched, before the next frame is taken.
         """
         lib.lever_recorder_step(self.pointer, self._estimator.pointer)
         while lib.lever_recorder_next_frame(self.pointer, self._frame):
@@ -297,8 +302,9 @@ class Recorder:
 
 
 def feed(estimator: Estimator, samples: NDArray[Any], at: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Have the estimator take samples (lever_sample_t), up to the last with an index in `at`, which rise. Returns
-    lever_estimate_t and lever_health_t after each of these.
+    """Have the estimator take samples (lever_sample_t), up to the last with an index in `at`, which rise.
+
+    Return lever_estimate_t and lever_health_t after each of these.
     """
     import numpy as np
 

@@ -24,9 +24,10 @@ INNOVATION = struct_dtype("sample_innovation_t")
 
 
 def samples_of(frames: Array, config: Config | None = None) -> tuple[Array, dict[str, str], Health]:
-    """Return the samples (SAMPLE) that the firmware makes of received frames (FRAME), the choices (model, preload …)
-    that commands among them have made, and its counts of what was wrong; lost is what comes later than
-    sample_period.
+    """Return the samples (SAMPLE) that the firmware makes of received frames (FRAME), choices, and health.
+
+    The choices (model, preload …) are those that commands among the frames have made; the health has the firmware's
+    counts of what was wrong; lost is what comes later than sample_period.
     """
     samples = np.empty(len(frames), SAMPLE)
     config, health = config or Config(), ffi.new("lever_health_t *")

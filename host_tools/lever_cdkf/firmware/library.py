@@ -22,8 +22,9 @@ ffi: Any = cffi.FFI()
 
 @cache
 def load(library: str) -> Any:
-    """Return the functions of a shared library; what installing has made of its header declares them. Raises
-    LeverError.
+    """Return the functions of a shared library; raise LeverError.
+
+    What installing has made of its header declares them.
     """
     ffi.cdef(native_file(f"{library}_cdef.h").read_text(encoding="utf-8"))
     path = native_file(shared_library(library))
@@ -76,7 +77,7 @@ def struct_dtype(ctype: str) -> np.dtype[Any]:
 
 
 def _scalar(kind: Any) -> str:
-    """numpy's name of a number or enum."""
+    """Return numpy's name of a number or enum."""
     if kind.cname == "_Bool":
         return "bool"
     letter = "f" if kind.cname in ("float", "double") else "i" if kind.cname.startswith("int") else "u"

@@ -79,8 +79,9 @@ def quantities(model: str) -> tuple[Quantity, ...]:
 
 
 def recorded_name(column: str) -> str:
-    """Return the column of an estimate as a replayed log has it: k_p_recorded_N_m of k_p_estimate_N_m, nis_recorded
-    of nis.
+    """Return the column of an estimate as a replayed log has it.
+
+    It is k_p_recorded_N_m of k_p_estimate_N_m, nis_recorded of nis.
     """
     for kind in ("_estimate", "_sigma"):
         if kind in column:

@@ -25,8 +25,9 @@ _OTHER_UNIT = 30.0
 
 
 def sample_array(samples: Mapping[str, Any], period: float) -> NDArray[Any]:
-    """Return an array of lever_sample_t from columns, which native.run_samples() describes; `period`: sample_period
-    [s].
+    """Return an array of lever_sample_t from columns, which native.run_samples() describes.
+
+    `period`: sample_period [s].
 
     Raise LeverError.
     """

@@ -67,8 +67,9 @@ def read_assignments(path: str | os.PathLike[str]) -> dict[str, str | float]:
 
 
 def lines_of(path: str | os.PathLike[str]) -> Iterator[tuple[str, str]]:
-    """Yield the lines of a file, as FILE:LINE and text, without comments, blanks around it and lines of these alone.
-    Raise SettingsError.
+    """Yield the lines of a file, as FILE:LINE and text; raise SettingsError.
+
+    They are without comments, blanks around it and lines of these alone.
     """
     try:
         content = Path(path).read_bytes()

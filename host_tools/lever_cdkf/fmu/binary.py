@@ -29,7 +29,7 @@ def platform_tuple() -> str:
 
 
 def library_suffix() -> str:
-    """Return the library suffix of a shared library in an FMU."""
+    """Return the suffix of a shared library in an FMU."""
     return {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
 
 
@@ -56,8 +56,9 @@ def compiler() -> list[str]:
 
 
 def compile_library(folder: Path, sources: Sequence[str], library: Path) -> None:
-    """Compile `sources` (paths below `folder`, which is where their headers are from, too) into `library`. Raises
-    LeverError.
+    """Compile `sources` into `library`; raise LeverError.
+
+    The sources are paths below `folder`, which is where their headers are from, too.
     """
     library.parent.mkdir(parents=True)
     include = ("-I", str(folder), "-isystem", str(headers()))

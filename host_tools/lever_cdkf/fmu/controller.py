@@ -22,8 +22,9 @@ _FAULT = "fault_"
 
 
 def controller(config: Config, aircraft: AircraftResponse | None, has_bus: bool = False) -> Contents:
-    """Return what is in the FMU of an estimator that starts with `config`, and watches the margin with `aircraft`;
-    its inputs are signals, or the frames of a CAN bus.
+    """Return what is in the FMU of an estimator that starts with `config`, and watches the margin with `aircraft`.
+
+    Its inputs are signals, or the frames of a CAN bus.
     """
     watched = "" if aircraft is None else f"; it watches the margin to collective bounce with {aircraft.name}"
     model = Model(

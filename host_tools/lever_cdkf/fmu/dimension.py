@@ -18,8 +18,9 @@ _FACTOR = re.compile(r"(1|[A-Za-z]+)(?:\^(\d+))?")
 
 
 def base_units(unit: str) -> dict[str, int] | None:
-    """Return exponents of the base units of a unit such as "N m s/rad"; None of one that is no product of whole
-    powers, such as "dB" or "1/sqrt(s)".
+    """Return the exponents of the base units of a unit such as "N m s/rad".
+
+    None of one that is no product of whole powers, such as "dB" or "1/sqrt(s)".
     """
     exponents: Counter[str] = Counter()
     for place, part in enumerate(unit.split("/")):

@@ -16,8 +16,9 @@ _ROLES = {"INPUT": "Inputs", "OUTPUT": "Outputs", "PARAMETER": "Parameters"}
 
 
 def page(package: str, template: str, model: Model, **more: str) -> str:
-    """Return the page of a model: the text of a template in `package` with the model's tables of variables; `more`
-    is HTML for further places in it.
+    """Return the page of a model: the text of a template in `package` with the model's tables of variables.
+
+    `more` is HTML for further places in it.
     """
     text = (files(package) / template).read_text(encoding="utf-8")
     tables = {f"{role.lower()}s": _table(model, role) for role in _ROLES}

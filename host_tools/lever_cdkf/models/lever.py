@@ -55,7 +55,7 @@ class Lever:
         return self.length**2 * (self.mass_position**2 * self.mass + m_p) + self.inertia
 
     def unbalance(self, m_p: Array) -> Array:
-        """l μ, first moment of mass about the pivot [kg m]."""
+        """Return l μ, the first moment of mass about the pivot [kg m]."""
         return self.length * (self.mass_position * self.mass + m_p)
 
     def restoring_torque(self, theta: Array, m_p: Array, k_p: Array, trim: float | Array) -> Array:

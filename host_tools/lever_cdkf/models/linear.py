@@ -58,8 +58,9 @@ class Linear(ABC):
         return np.array((theta + dt * (rate + 0.5 * change), rate + change))
 
     def dynamics(self, p: Array, trim: float | Array) -> Array:
-        """Return natural frequency [Hz] and damping ratio [1] of parameters (3, …), shape (2, …), the same about any
-        trim.
+        """Return natural frequency [Hz] and damping ratio [1] of parameters (3, …), shape (2, …).
+
+        They are the same about any trim.
 
         Without a restoring stiffness there is neither, and both are 0.
         """

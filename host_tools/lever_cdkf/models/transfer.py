@@ -27,8 +27,9 @@ class Transfer:
         return response
 
     def dominant_mode(self) -> tuple[FloatArray, FloatArray]:
-        """Return natural frequency |p| / 2 pi [Hz] and damping ratio -Re p / |p| [1] of the dominant mode, each
-        (times,).
+        """Return natural frequency |p| / 2 pi [Hz] and damping ratio -Re p / |p| [1] of the dominant mode.
+
+        Each is (times,).
 
         In partial fractions the response is a sum r / (s - p) over the poles p; a mode is a pole with its conjugate.
         Dominant is the one whose own terms have the largest mean square over BAND. Poles must be distinct.

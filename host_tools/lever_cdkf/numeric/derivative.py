@@ -48,8 +48,9 @@ def derivative_correlation(angle: Signal, rate: Signal) -> float:
 
 
 def derivative_ratio(angle: Signal, rate: Signal) -> float:
-    """Return a rate as a multiple of the slope of the angle, negative where their signs differ; 0 where they are not
-    alike.
+    """Return a rate as a multiple of the slope of the angle, negative where their signs differ.
+
+    It is 0 where they are not alike.
     """
     slope, value = _slope_and_rate(angle, rate)
     likeness = _likeness(slope, value)

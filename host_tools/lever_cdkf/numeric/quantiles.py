@@ -37,8 +37,9 @@ def chi_square_band(freedom: int) -> tuple[float, float]:
 
 
 def _chi_square_exceeds(x: float, freedom: int) -> float:
-    """Return probability that chi-square is above x > 0: a finite sum (M. Abramowitz, I. A. Stegun, 26.4.4 and
-    26.4.5).
+    """Return the probability that chi-square is above x > 0.
+
+    It is a finite sum (M. Abramowitz, I. A. Stegun, 26.4.4 and 26.4.5).
     """
     half, power = 0.5 * x, 0.5 * freedom - 1.0
     term = math.exp(power * math.log(half) - half - math.lgamma(power + 1.0))

@@ -36,7 +36,9 @@ class Columns:
         rated: bool,
         absent: tuple[str, ...] = (),
     ) -> None:
-        """`watched`: whether the estimator knows the aircraft; `rated`: whether it sends test ratios; `absent`: faults
+        """Prepare the columns of `model`.
+
+        `watched`: whether the estimator knows the aircraft; `rated`: whether it sends test ratios; `absent`: faults
         that say only that an input is missing which the mapping does not have.
         """
         self._timeline = timeline
@@ -50,8 +52,9 @@ class Columns:
         """Recorded estimates that belong to another sample than the one before them."""
 
     def of(self, rows: Rows) -> Trace:
-        """Return the columns of trace.csv without truth; with those of a recorded estimator, if there is one, at the
-        end.
+        """Return the columns of trace.csv without truth.
+
+        Those of a recorded estimator, if there is one, are at the end.
         """
         decoded = _Decoded(rows)
         trace: Trace = {"time_s": self._timeline.seconds(rows["time_us"], decoded.fields("BASE_SAMPLE")["time_us"])}
@@ -131,8 +134,10 @@ class _Decoded:
         return fields.columns("BASE_SAMPLE", base)["time_us"].astype(np.int64)
 
     def held(self, message: str, field: str, continued: Continued | None = None) -> FloatArray:
-        """NaN before the first. Decodes only the rows with which the message came, and the first; what `continued`
-        makes of the values there is held.
+        """Return a field of a message, held from frame to frame; NaN before the first.
+
+        Only the rows with which the message came are decoded, and the first; what `continued` makes of the values there
+        is held.
         """
         if message not in self._held:
             slot = self._slots[message]

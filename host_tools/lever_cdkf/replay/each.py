@@ -65,8 +65,9 @@ class Replayed:
 def replay_each(
     logs: Sequence[str], options_of: Callable[[str], Options], out: Path | None, progress: Progress | None = None
 ) -> list[Replayed]:
-    """Replay each log; with `out`, its files are in a folder of it that is called as the log is. What is wrong with
-    a log is its row's `problem`, and the others go on.
+    """Replay each log; with `out`, its files are in a folder of it that is called as the log is.
+
+    What is wrong with a log is its row's `problem`, and the others go on.
     """
     replays = []
     for log, folder in zip(logs, _folders(logs), strict=True):
@@ -88,8 +89,9 @@ def rows_of(replays: Sequence[Replayed]) -> list[Row]:
 
 
 def write(replays: Sequence[Replayed], out: Path, inputs: Sequence[str]) -> list[str]:
-    """Write the page and the table, as far as their extras are installed; return their names. `inputs` are files
-    beside the logs. Raise LeverError.
+    """Write the page and the table, as far as their extras are installed; return their names.
+
+    `inputs` are files beside the logs. Raise LeverError.
     """
     logs = [each.log for each in replays]
     origin = provenance([*logs, *inputs])

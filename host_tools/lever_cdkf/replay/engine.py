@@ -81,9 +81,10 @@ def replay(
     progress: Progress | None = None,
     keep: Callable[[Mapping[str, FloatArray]], None] | None = None,
 ) -> ReplaySummary:
-    """Replays logs, one after another in time, and return what summary.json says; with `out_dir` also writes bus.log,
-    the signals, report.html (with the extra `report`) and summary.json there, all or none, and hands the trace,
-    reduced, to `keep`. Raise LeverError, also rather than write over a log.
+    """Replay logs, one after another in time, and return what summary.json says.
+
+    With `out_dir` also write bus.log, the signals, report.html (with the extra `report`) and summary.json there, all or
+    none, and hand the trace, reduced, to `keep`. Raise LeverError, also rather than write over a log.
     """
     logs = list(logs)
     traffic: EstimatorFrames | MappedFrames
@@ -193,7 +194,7 @@ class _Replay:
             self._folder.signals.add(trace, published, recorded)
 
     def _start(self, rows: Rows) -> Columns:
-        """Return everything that has to know the model."""
+        """Start everything that has to know the model."""
         self._model_number = next((number for _, number in model_numbers(rows)), 0)
         self.model = enum_names("lever_model")[self._model_number]
         there = bool(np.any(rows["known"] >> min(RECORDED.values())))

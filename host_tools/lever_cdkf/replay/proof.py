@@ -46,8 +46,9 @@ class Proof:
         self._time_of = codec.raw_field("BASE_SAMPLE", "time_us")
 
     def pieces(self, frames: Frames, last: bool = False) -> Iterator[tuple[Frames, Snapshot | None]]:
-        """Yield the frames to feed, in pieces; the estimator has the state of the snapshot, if there is one, after
-        its piece. Some are held back until the next call, or the `last`.
+        """Yield the frames to feed, in pieces; some are held back until the next call, or the `last`.
+
+        The estimator has the state of the snapshot, if there is one, after its piece.
         """
         held = frames if self._held is None else np.concatenate((self._held, frames))
         self._held = held
@@ -102,7 +103,7 @@ class Proof:
         return None
 
     def _end_of_certain(self, held: Frames, found: list[Snapshot], places: list[int | None]) -> int:
-        """Return frames before it belong to no snapshot that is still to come."""
+        """Return the place before which no frame belongs to a snapshot that is still to come."""
         if found and not found[-1].ended:
             begin = found[-1].begin
             if abs(held["time_us"][-1] - held["time_us"][begin]) < _LONGEST_US:
@@ -112,8 +113,10 @@ class Proof:
         return int(samples[0]) if len(samples) else 0
 
     def _start(self, held: Frames, found: list[Snapshot], places: list[int | None]) -> int:
-        """Where to begin: with the log, or after the sample of the first whole snapshot, if the log is not of the
-        flight from its start.
+        """Return where to begin.
+
+        That is with the log, or after the sample of the first whole snapshot, if the log is not of the flight from its
+        start.
         """
         for snapshot, place in zip(found, places, strict=True):
             if snapshot.state is None or place is None or not self._is_comparable(snapshot):

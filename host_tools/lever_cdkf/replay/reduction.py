@@ -72,8 +72,9 @@ class Stretches:
         self._rest = {name: values[done:].copy() for name, values in columns.items()}
 
     def rows(self) -> dict[str, FloatArray]:
-        """Return the columns reduced, two rows a stretch: least and greatest of what moves quickly, else twice the
-        first.
+        """Return the columns reduced, two rows a stretch.
+
+        They are least and greatest of what moves quickly, else twice the first.
 
         As they came where there are few. Times are those of the first sample and of the middle.
         """

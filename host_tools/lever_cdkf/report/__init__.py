@@ -29,8 +29,10 @@ def write_report(
     path: str | os.PathLike[str],
     story: Story | None = None,
 ) -> None:
-    """Write the page. `trace` has the columns of trace.csv, of which only time_s is indispensable; `summary` is that
-    of summary.json, where there is one. Raise LeverError when `path` cannot be written.
+    """Write the page; raise LeverError when `path` cannot be written.
+
+    `trace` has the columns of trace.csv, of which only time_s is indispensable; `summary` is that of summary.json,
+    where there is one.
     """
     from .run import Run  # here, so that importing this package stays quick
 

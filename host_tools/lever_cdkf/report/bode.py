@@ -37,7 +37,7 @@ def _of_lever(lever: Lever, parameters: Array, trim: Array) -> Transfer:
 
 
 def _of_linear_physical(_: Lever, parameters: Array, __: Array) -> Transfer:
-    """m θ̈ + c θ̇ + k θ = m z̈."""
+    """Return the transfer function of m θ̈ + c θ̇ + k θ = m z̈."""
     return Transfer(parameters[0][:, np.newaxis], parameters.T)
 
 
@@ -66,8 +66,10 @@ _TRANSFERS: Mapping[str, Callable[[Lever, Array, Array], Transfer]] = {
 
 
 def magnitude_and_phase(response: ComplexArray) -> tuple[Array, Array]:
-    """Return the magnitude and phase of a response over frequency. The phase [deg] goes on downwards, from -180
-    where the lever moves against the floor at first (the arm's weight does so), from 0 where it moves along.
+    """Return the magnitude and phase of a response over frequency.
+
+    The phase [deg] goes on downwards, from -180 where the lever moves against the floor at first (the arm's weight does
+    so), from 0 where it moves along.
     """
     start = -180.0 if response[0].real < 0.0 else 0.0
     along = response if start == 0.0 else -response
@@ -75,8 +77,9 @@ def magnitude_and_phase(response: ComplexArray) -> tuple[Array, Array]:
 
 
 def slow_trim(time: Array, theta: Array, corner: float, longest_step: float = LONGEST_STEP) -> Array:
-    """Return the estimator's own idea of the trim angle [rad]: the slow part of θ, held over gaps (NaN); corner
-    [Hz].
+    """Return the estimator's own idea of the trim angle [rad]: the slow part of θ, held over gaps (NaN).
+
+    `corner`: [Hz].
     """
     trim = np.empty(len(theta))
     measured = theta[np.isfinite(theta)]

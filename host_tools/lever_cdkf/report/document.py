@@ -13,8 +13,10 @@ from .figure import Spec
 
 
 def document(title: str, body: str, figures: Mapping[str, Spec], style: str = "") -> str:
-    """Return the whole page. `title` is text, `body` HTML; `figures` are drawn where an element has their key as id;
-    `style` is CSS beyond page.css.
+    """Return the whole page.
+
+    `title` is text, `body` HTML; `figures` are drawn where an element has their key as id; `style` is CSS beyond
+    page.css.
     """
     require("report")
     import plotly.offline
@@ -31,5 +33,5 @@ def document(title: str, body: str, figures: Mapping[str, Spec], style: str = ""
 
 
 def _packed(text: str) -> str:
-    """gzip in base64, which page.js unpacks."""
+    """Return the text as gzip in base64, which page.js unpacks."""
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")

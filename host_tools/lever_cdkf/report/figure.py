@@ -54,8 +54,9 @@ def _trace(x: Array, y: Array, name: str, row: int) -> Spec:
 
 
 def axis_range(columns: list[Array], settled: slice, share: float = 0.08, zero: bool = False) -> list[float] | None:
-    """Return an axis range that shows all that the columns do in `settled`, so that a wild start does not squeeze
-    the rest.
+    """Return an axis range that shows all that the columns do in `settled`.
+
+    So a wild start does not squeeze the rest.
     """
     values = np.concatenate([column[settled] for column in columns])
     values = values[np.isfinite(values)]
@@ -108,8 +109,10 @@ class Figure:
             self.shapes.append({"type": "line", "line": style} | ends)
 
     def choose(self, of: list[Spec], first: int = 0, slider: str = "") -> None:
-        """Have the user choose by buttons, or by a slider with that name. Each of them is a "label", and "data" and
-        "layout" for Plotly.update of the "traces" (all); `first` is what the figure shows as it is.
+        """Have the user choose by buttons, or by a slider with that name.
+
+        Each of them is a "label", and "data" and "layout" for Plotly.update of the "traces" (all); `first` is what the
+        figure shows as it is.
         """
         self.choices = {"of": of, "first": first, "slider": slider}
 

@@ -209,7 +209,7 @@ class Run:
 
     @cached_property
     def sample_period(self) -> float:
-        """[s]"""
+        """Return the time from sample to sample [s]."""
         return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 1.0
 
     @cached_property

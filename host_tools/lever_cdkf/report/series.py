@@ -51,8 +51,9 @@ def envelope(time: Array, values: Array, buckets: int = 1000) -> tuple[Array, Ar
 
 
 def jumps(time: Array, columns: list[Array], relative: float = 0.02, apart: float = 0.05) -> list[float]:
-    """Return times [s] at which a column steps by more than `relative` in one sample; steps closer than `apart` are
-    one.
+    """Return times [s] at which a column steps by more than `relative` in one sample.
+
+    Steps closer than `apart` are one.
     """
     if len(time) < 2:
         return []

@@ -72,8 +72,9 @@ def verdict(run: Run) -> str:
 
 
 def _headline(run: Run) -> str:
-    """Return the headline of the natural frequency: how well it was estimated, or, where its truth is not known,
-    what it was at the end.
+    """Return the headline of the natural frequency: how well it was estimated.
+
+    Where its truth is not known, it is what it was at the end.
     """
     quantity = DYNAMICS[0]
     figures = figures_of(run, quantity)

@@ -48,8 +48,9 @@ class Coherence:
         self._rest = joined[:, cut.shape[1] * hop :].copy()
 
     def spectrum(self) -> tuple[FloatArray, FloatArray]:
-        """Return frequencies [Hz] and coherence [1]; NaN where a signal has no power, and with fewer than two
-        windows.
+        """Return frequencies [Hz] and coherence [1].
+
+        NaN where a signal has no power, and with fewer than two windows.
         """
         frequency: FloatArray = np.fft.rfftfreq(self._length, self._period).astype(np.float64)
         coherence: FloatArray = np.full(len(frequency), np.nan)

@@ -27,8 +27,9 @@ class Feedthrough(InTurn):
         super().__init__([column for column, _, _ in FEEDTHROUGH], FREQUENCIES)
 
     def at(self, time: FloatArray) -> dict[str, FloatArray]:
-        """response (complex) [rad/(m/s²)], gain_sigma [1] and phase_sigma [rad], each (times, FREQUENCIES), as last
-        sent before each time [s]; NaN before the first, and where it was not available.
+        """Return the response (complex) [rad/(m/s²)], gain_sigma [1] and phase_sigma [rad], each (times, FREQUENCIES).
+
+        They are as last sent before each time [s]; NaN before the first, and where it was not available.
         """
         latest = self.latest(time)
         return {

@@ -32,8 +32,9 @@ class InTurn:
         self._parts.append(rows[np.unique(slot, return_index=True)[1]])
 
     def latest(self, time: FloatArray) -> FloatArray:
-        """Return the columns after the first, (times, keys, columns), as last sent before each time [s]; NaN before the
-        first, and where it was not available.
+        """Return the columns after the first, (times, keys, columns), as last sent before each time [s].
+
+        NaN before the first, and where it was not available.
         """
         rows = np.concatenate([np.full((1, len(self._columns)), np.nan), *self._parts])
         latest = np.full((len(time), len(self._keys), len(self._columns) - 2), np.nan)

@@ -1,5 +1,6 @@
-"""Test ratios as the estimator sends them (`publish_test_ratios`), one statistic after the other: what it watches for
-faults and changes, each over its threshold.
+"""Test ratios as the estimator sends them (`publish_test_ratios`), one statistic after the other.
+
+They are what it watches for faults and changes, each over its threshold.
 """
 
 from __future__ import annotations

@@ -32,8 +32,9 @@ _FILES = {
 
 
 def missing(extra: str, *packages: str) -> str:
-    """Return which packages of an extra, or of these alone, are not installed, and how to get them; empty if all
-    are.
+    """Return which packages of an extra, or of these alone, are not installed, and how to get them.
+
+    Empty if all are.
     """
     needed = packages or PACKAGES[extra]
     if "asammdf" in needed:

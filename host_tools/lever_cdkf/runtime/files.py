@@ -23,8 +23,9 @@ LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
 
 
 def native_file(name: str) -> Path:
-    """Return the path of `name` (shared library, its declarations, lever.dbc), which installing has put into
-    `_native`.
+    """Return the path of `name`, which installing has put into `_native`.
+
+    It is the shared library, its declarations, or lever.dbc.
     """
     folders = [Path(folder) for folder in os.environ.get(LIBRARY_DIR, "").split(os.pathsep) if folder]
     folders += [Path(folder) / "_native" for folder in lever_cdkf.__path__]  # two, if the install is editable
@@ -116,13 +117,16 @@ def check_not_input(path: str | os.PathLike[str] | None, inputs: Iterable[str | 
 
 
 class Outputs:
-    """The files of a command in a folder: written into a hidden one in it, and put into place together when all are
-    whole. A context manager; without finish() it leaves what was there before, and nothing else.
+    """The files of a command in a folder, put into place together when all are whole.
+
+    Until then they are in a hidden folder in it. A context manager; without finish() it leaves what was there before,
+    and nothing else.
     """
 
     def __init__(self, folder: Path, inputs: Iterable[str | os.PathLike[str]] = (), names: Iterable[str] = ()) -> None:
-        """Protect `inputs` of the command from being written over; finish() removes the files among `names` that an
-        earlier run has left and this one has not made.
+        """Protect `inputs` of the command from being written over.
+
+        finish() removes the files among `names` that an earlier run has left and this one has not made.
         """
         self._folder = folder
         self._may_be_there = tuple(names)

@@ -69,8 +69,9 @@ def forget() -> None:
 
 
 def in_processes(function: Callable[[_Task], _Done], tasks: Sequence[_Task], jobs: int) -> Iterator[_Done]:
-    """function(task) of all tasks, in their order, from `jobs` processes; what is done before they would have started,
-    in this one. Interrupted, it leaves no process behind.
+    """Yield function(task) of all tasks, in their order, from `jobs` processes.
+
+    What is done before they would have started is done in this one. Interrupted, it leaves no process behind.
     """
     done, end = 0, time.monotonic() + START
     while done < len(tasks) and (jobs == 1 or done == len(tasks) - 1 or time.monotonic() < end):

@@ -66,16 +66,18 @@ class Provenance:
         return "".join(f"# {line}\n" for line in (generator, self.command, *hashes))
 
     def properties(self, **more: Any) -> dict[str, str]:
-        """Return name and text of each property, for formats that keep pairs of text; `more` are further ones, as
-        JSON.
+        """Return name and text of each property, for formats that keep pairs of text.
+
+        `more` are further ones, as JSON.
         """
         given = {name: value for name, value in asdict(self).items() if value}
         return {"software": SOFTWARE} | {name: _as_text(value) for name, value in (given | more).items()}
 
 
 def provenance(inputs: Iterable[str | os.PathLike[str]] = ()) -> Provenance:
-    """Return the provenance of this process, now; `inputs` are the files that it reads. Raise LeverError for a
-    SOURCE_DATE_EPOCH that is no number.
+    """Return the provenance of this process, now; `inputs` are the files that it reads.
+
+    Raise LeverError for a SOURCE_DATE_EPOCH that is no number.
     """
     return Provenance(
         version=version(),

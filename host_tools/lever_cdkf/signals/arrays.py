@@ -15,8 +15,10 @@ from .units import KINDS, normal, split_name
 
 
 def columns_of(data: Any) -> Columns:
-    """Return values and unit of each column of a pandas or polars frame, an xarray Dataset, a structured array, or a
-    mapping of arrays; an index or coordinate with a name, or of times, is a column too. Raise LeverError.
+    """Return values and unit of each column of `data`; raise LeverError.
+
+    It is a pandas or polars frame, an xarray Dataset, a structured array, or a mapping of arrays; an index or
+    coordinate with a name, or of times, is a column too.
     """
     raw: dict[str, Any]
     if hasattr(data, "data_vars"):  # xarray
@@ -84,7 +86,7 @@ def _time(columns: Columns, units: Mapping[str, str]) -> tuple[str, FloatArray]:
 
 
 def _key(name: str) -> str:
-    """theta of theta, theta_deg and "theta [deg]"."""
+    """Return theta of theta, theta_deg and "theta [deg]"."""
     label, unit = split_name(name)
     if label == name and unit:
         for key in sorted(KINDS, key=len, reverse=True):

@@ -50,8 +50,9 @@ def load_database(path: str | Path) -> Database:
 
 
 def _encoding(path: Path) -> str | None:
-    """Return the encoding of a DBC, which does not say it: UTF-8 where it is that, else what cantools takes for its
-    format.
+    """Return the encoding of a DBC, which does not say it.
+
+    It is UTF-8 where the file is that, else what cantools takes for its format.
     """
     if path.suffix.lower() != ".dbc":
         return None

@@ -137,9 +137,7 @@ def samples_of(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[S
 
 
 def _disagreement(inputs: Mapping[str, Input], samples: Samples) -> list[str]:
-    """Return whether the angular rate is the slope of the angle; where it is not, one of their units or signs is
-    wrong.
-    """
+    """Return a note where the angular rate is not the slope of the angle: one of their units or signs is wrong."""
     if not {"theta", "theta_dot"} <= inputs.keys():
         return []
     ratio = derivative_ratio(inputs["theta"].signal, inputs["theta_dot"].signal)

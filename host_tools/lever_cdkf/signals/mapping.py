@@ -87,8 +87,9 @@ class Mapping:
 
 
 def read_mapping(entries: Iterable[str]) -> Mapping:
-    """Return a mapping of KEY=SIGNAL[,OPTION=VALUE…] and of .toml files, later ones over earlier ones. Raises
-    LeverError.
+    """Return a mapping of KEY=SIGNAL[,OPTION=VALUE…] and of .toml files, later ones over earlier ones.
+
+    Raise LeverError.
     """
     sources: dict[str, Source] = {}
     protected: dict[str, Protection] = {}

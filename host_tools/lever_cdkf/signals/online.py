@@ -50,8 +50,9 @@ class Online:
         self._counter = 0
 
     def take(self, identifier: int, extended: bool, data: bytes, time: float) -> list[LeverFrame]:
-        """Return the frames of a sample that a message completes, mostly none. Raise LeverError when signals that
-        have been looked at are not what the mapping says.
+        """Return the frames of a sample that a message completes, mostly none.
+
+        Raise LeverError when signals that have been looked at are not what the mapping says.
         """
         frames: list[LeverFrame] = []
         for key, message, signal in self._wanted.get((identifier, extended), ()):

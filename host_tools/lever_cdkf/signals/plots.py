@@ -27,8 +27,9 @@ _TICKS = 5
 
 
 def sparkline(signal: Signal, width: int) -> str:
-    """Return the means of `width` equal parts of its time, from least to greatest as eight heights; blank where none
-    is.
+    """Return the means of `width` equal parts of its time, from least to greatest as eight heights.
+
+    It is blank where there is no mean.
     """
     values = _parts(signal, width)[1]
     present = values[np.isfinite(values)]
@@ -120,8 +121,9 @@ def _page(signals: Sequence[tuple[str, Signal]], title: str) -> str:
 
 
 def _svg(signal: Signal, begin: float, end: float) -> str:
-    """Over the time of all, from `begin` to `end` [s], which is counted from `begin`: in each part of it the range
-    that the values cover.
+    """Return the range that the values cover, in each part of the time of all.
+
+    That is from `begin` to `end` [s], counted from `begin`.
     """
     time, lows, highs = _ranges(signal, _points(signal, _POINTS))
     present = np.isfinite(lows)

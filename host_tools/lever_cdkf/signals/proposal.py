@@ -102,8 +102,9 @@ class Candidate:
 
 
 def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candidate]]:
-    """Return the mapping, and the candidates that it is made of. Raise LeverError where there is none for lever or
-    base.
+    """Return the mapping, and the candidates that it is made of.
+
+    Raise LeverError where there is none for lever or base.
     """
     moving = [signal for signal in signals if _moves(signal.values) and signal.period < 0.5]
     candidates = [_candidate(key, signal) for signal in moving for key in INPUTS]
@@ -144,8 +145,9 @@ def _source(each: Candidate, chosen: dict[str, Candidate], unit: str) -> Source:
 
 
 def _unit(each: Candidate, chosen: dict[str, Candidate]) -> tuple[str, tuple[str, ...]]:
-    """Return the unit of a signal; where it has none and a replay could not tell or would be wrong, the likely one
-    and why.
+    """Return the unit of a signal.
+
+    Where it has none and a replay could not tell or would be wrong, it is the likely one and why.
     """
     if each.signal.unit:
         return each.signal.unit, ()
@@ -245,7 +247,7 @@ def _best(candidates: Iterable[Candidate], key: str) -> list[Candidate]:
 
 
 def _with_slopes(candidates: list[Candidate]) -> list[Candidate]:
-    """Return angles and rates that belong together gain."""
+    """Return the candidates, where angles and rates that belong together have gained."""
     gains: dict[tuple[str, str], tuple[float, str]] = {}
     for angle in _best(candidates, "theta"):
         for rate in _best(candidates, "theta_dot"):
@@ -256,7 +258,7 @@ def _with_slopes(candidates: list[Candidate]) -> list[Candidate]:
 
 
 def _with_movement(candidates: list[Candidate]) -> list[Candidate]:
-    """Return what moves with the base gains: the lever is held by an arm, the base shakes both."""
+    """Return the candidates, where what moves with the base has gained: it shakes both the lever and the arm on it."""
     base = _best(candidates, "z_ddot")[:1]
     gains: dict[tuple[str, str], tuple[float, str]] = {}
     for key in ("theta", "theta_dot"):
@@ -269,7 +271,7 @@ def _with_movement(candidates: list[Candidate]) -> list[Candidate]:
 
 
 def _with_company(candidates: list[Candidate], angle: Signal, key: str) -> list[Candidate]:
-    """Return what is in the angle's own message gains."""
+    """Return the candidates, where what is in the angle's own message has gained."""
     message, _, _ = angle.name.rpartition(".")
     beside = [each for each in candidates if each.key == key and message and each.signal.name.startswith(f"{message}.")]
     words = f"in the message of {angle.name}"

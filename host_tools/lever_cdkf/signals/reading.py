@@ -172,7 +172,7 @@ def _check_there(path: str) -> None:
 def _collect(
     reader: BusSignals, recording: Recording, start: float, length: float, progress: Progress | None
 ) -> tuple[int, tuple[str, ...]]:
-    """Return hand the frames of a part to the reader; return how many there are, and where their clock was set back."""
+    """Hand the frames of a part to the reader; return how many there are, and where their clock was set back."""
     frames = 0
     first_us: int | None = None
     clock = RunningClock(1e6 * LATE)

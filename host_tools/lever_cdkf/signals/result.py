@@ -118,8 +118,9 @@ class Result(Mapping[str, Estimated]):
         return table | {"nis": (self._raw["nis"], "1"), "mode": (self.mode, ""), "flags": (self.flags, "")}
 
     def to_parquet(self, path: str | Path) -> None:
-        """Write columns() with the units as metadata of the fields, and provenance as metadata of the file. Raises
-        LeverError.
+        """Write columns() with the units as metadata of the fields, and provenance as metadata of the file.
+
+        Raise LeverError.
         """
         require("files")
         import pyarrow
@@ -138,10 +139,12 @@ class Result(Mapping[str, Estimated]):
         return {**self.config.choices, "settings": self.config.settings}
 
     def plot(self, path: str | Path | None = None, *, width: str = "double") -> Any:
-        """Return the parameters, natural frequency and damping ratio over time with their bands of ±2 sigma, as a
-        Figure of matplotlib, as wide as one ("single", 88 mm) or two ("double", 180 mm) columns of a journal.
+        """Return the parameters, natural frequency and damping ratio over time with their bands of ±2 sigma.
 
-        path: where to keep it (.pdf, .svg or .png), with what it shows beside it as CSV. Raises LeverError.
+        They are a Figure of matplotlib, as wide as one ("single", 88 mm) or two ("double", 180 mm) columns of a
+        journal.
+
+        path: where to keep it (.pdf, .svg or .png), with what it shows beside it as CSV. Raise LeverError.
         """
         require("study")
         from ..exports import pictures

@@ -1,5 +1,6 @@
-"""Files of columns as signals: text with a header, MF4 with signals, Parquet, MAT, NPZ. Each column has its name, and a
-unit where the file says one; each has a time, which is a column too.
+"""Files of columns as signals: text with a header, MF4 with signals, Parquet, MAT, NPZ.
+
+Each column has its name, and a unit where the file says one; each has a time, which is a column too.
 """
 
 from __future__ import annotations
@@ -46,8 +47,9 @@ def is_table(path: str) -> bool:
 
 
 def read_table(path: str, time: str | None = None) -> list[Signal]:
-    """Return all columns of numbers, with the time of each [s]; `time` names the column that is it. Raises
-    LeverError.
+    """Return all columns of numbers, with the time of each [s]; raise LeverError.
+
+    `time` names the column that is it.
     """
     readers: dict[str, Callable[[str, str | None], list[Signal]]] = {
         ".parquet": _parquet,

@@ -128,8 +128,9 @@ def _layout(lines: list[str], path: str) -> tuple[str, bool, int]:
 
 
 def _first_row(lines: list[str], delimiter: str, comma: bool) -> tuple[int, int]:
-    """Return how well the lines fit, 0: not at all, and which is the first of several with as many fields, mostly
-    numbers.
+    """Return how well the lines fit, 0: not at all, and which is the first of several with as many fields.
+
+    Those fields are mostly numbers.
     """
     rows = [_fields(line, delimiter) for line in lines]
     numbered = [[_number(each, comma) for each in row] for row in rows]
@@ -146,7 +147,7 @@ def _first_row(lines: list[str], delimiter: str, comma: bool) -> tuple[int, int]
 
 
 def _says_little(values: list[float | None]) -> bool:
-    """Return a time, and nothing known at it."""
+    """Return whether it is a row of a time, and nothing known at it."""
     return None not in values and any(value == value for value in values)
 
 

@@ -67,8 +67,9 @@ def normal(unit: str) -> str:
 
 
 def factor(key: str, unit: str) -> float | None:
-    """Return what values in `unit` are multiplied by to be in the firmware's; None for a unit that is none of this
-    kind.
+    """Return what values in `unit` are multiplied by to be in the firmware's.
+
+    None for a unit that is none of this kind.
     """
     return _FACTORS[KINDS[key][0]].get(normal(unit))
 

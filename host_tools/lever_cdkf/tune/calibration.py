@@ -114,8 +114,9 @@ class Calibration:
 def calibrate(
     likelihood: Likelihood, assignments: Assignments, kept: Sequence[str] = (), progress: ShowProgress | None = None
 ) -> Calibration:
-    """Look for all of NAMES that are not `kept`, in the parts of the log in which the arm does not change. With a
-    wrong calibration other changes are found than with the right one: it is looked for until they stay the same.
+    """Look for all of NAMES that are not `kept`, in the parts of the log in which the arm does not change.
+
+    With a wrong calibration other changes are found than with the right one: it is looked for until they stay the same.
     """
     likelihood.leave_out_changes(assignments)
     found = _calibrate(likelihood, assignments, kept, progress)
@@ -143,7 +144,7 @@ def _calibrate(
 
 
 def dither(likelihood: Likelihood) -> float:
-    """rms of the motor torque in the part that is tuned on, above DITHER_FROM [N m]."""
+    """Return the rms of the motor torque in the part that is tuned on, above DITHER_FROM [N m]."""
     recording = likelihood.recording
     torque = np.where(recording.samples["tau_m_valid"], recording.samples["tau_m"], 0.0).astype(np.float64)
     high_pass = butter(2, DITHER_FROM, "highpass", fs=1.0 / recording.period, output="sos")
@@ -302,8 +303,9 @@ class _Fit:
         return at, now, 0.0 * step
 
     def _calibrated(self, at: Array, scores: Array, now: Array) -> tuple[Calibrated, ...]:
-        """Return the standard deviations contain that of tau_m_gain, of which the log says nothing: as in a
-        Schmidt-Kalman filter, it is considered, not estimated.
+        """Return what was found of each, with a standard deviation that contains that of tau_m_gain.
+
+        The log says nothing of tau_m_gain: as in a Schmidt-Kalman filter, it is considered, not estimated.
         """
         torque_sigma, h = self._settings[f"{TORQUE_GAIN}_sigma"], _STEPS[TORQUE_GAIN]
         covariance = np.linalg.inv(self._information(scores))
@@ -327,7 +329,8 @@ class _Fit:
 
 
 def _smaller(slopes: Sequence[Array]) -> int:
-    """Return which of two differences, to either side, has the smaller sum of squares: a change of the pilot that is
-    detected on one side alone would look like information.
+    """Return which of two differences, to either side, has the smaller sum of squares.
+
+    A change of the pilot that is detected on one side alone would look like information.
     """
     return int(np.argmin([float(column @ column) for column in slopes]))

@@ -54,9 +54,10 @@ class Likelihood:
         """True at those that are held out."""
 
     def leave_out_changes(self, assignments: Assignments) -> bool:
-        """Tune on those parts only in which the estimator, with these settings, finds no change of the arm. Where
-        that would leave less than half of what is tuned on, all stays: then it is not the arm that changes. Returns
-        whether other parts are tuned on than before.
+        """Tune on those parts only in which the estimator, with these settings, finds no change of the arm.
+
+        Where that would leave less than half of what is tuned on, all stays: then it is not the arm that changes.
+        Return whether other parts are tuned on than before.
         """
         recording, before = self.recording, self.tuned_on
         changed = self.run(noise_as_set(assignments))["changed"]
@@ -78,8 +79,9 @@ class Likelihood:
         return begin, end - begin
 
     def run(self, assignments: Assignments, delay: float = 0.0) -> Array:
-        """Return what the estimator with these settings and choices makes of the samples: innovations.INNOVATION for
-        each.
+        """Return what the estimator with these settings and choices makes of the samples.
+
+        It is innovations.INNOVATION for each.
 
         A `delay` of the base acceleration [s] is undone before.
         """

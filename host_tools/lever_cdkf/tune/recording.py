@@ -64,8 +64,10 @@ def read(
     progress: Callable[[int, int, str], None] | None = None,
     reading: Reading | None = None,
 ) -> Recording:
-    """Return the samples on the bus `channel` (if not given: the one that has any) from `start` on for `length`,
-    both [s] of recorded time; with `reading`, of a log that does not speak lever.dbc. Raise LeverError.
+    """Return the samples on the bus `channel` (if not given: the one that has any); raise LeverError.
+
+    They are those from `start` on for `length`, both [s] of recorded time; with `reading`, of a log that does not speak
+    lever.dbc.
     """
     if reading is not None:
         mapped = MappedFrames(list(map(str, paths)), reading)

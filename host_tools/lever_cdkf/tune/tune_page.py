@@ -83,8 +83,9 @@ def _dot(x: float, lane: int, name: str, marker: Spec, more: Spec) -> Spec:
 
 
 def _innovations(page: Page, fits: Sequence[Fit]) -> tuple[str, ...]:
-    """Return the innovations of the part that was held out, or, if none was, of the one that was tuned on; noise as
-    set.
+    """Return the innovations of the part that was held out, or, if none was, of the one that was tuned on.
+
+    Noise is as set.
     """
     part = fits[-1].part
     shown = [fit for fit in fits if fit.noise == "as set" and fit.part == part]

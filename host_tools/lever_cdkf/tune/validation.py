@@ -77,8 +77,9 @@ class Gain:
 
 
 def fits(likelihood: Likelihood, before: Assignments, after: Assignments) -> list[Fit]:
-    """Return both settings, with noise as set and, if the settings have that, estimated while running, on both
-    parts.
+    """Return the fits of both settings on both parts.
+
+    They are with noise as set and, if the settings have that, estimated while running.
     """
     ways: dict[str, Mapping[str, Mapping[str, str | float]]] = {
         "as set": {"before": noise_as_set(before), "after": noise_as_set(after)}

@@ -84,8 +84,9 @@ def estimates(picture: Picture, span: float, width: int, lines: int = 1) -> Tabl
 
 
 def feedthrough(picture: Picture, width: int) -> Table:
-    """θ/z̈ of the estimate by frequency, with sigma, and the measured coherence of the two: a column a frequency, or a
-    row where these are more than `width` [characters].
+    """Return θ/z̈ of the estimate by frequency, with sigma, and the measured coherence of the two.
+
+    It is a column a frequency, or a row where these are more than `width` [characters].
     """
     entries = picture.feedthrough()
     measured = picture.coherence()
@@ -116,8 +117,9 @@ def _grid(widths: Sequence[int], head: Sequence[str], rows: Sequence[Sequence[st
 
 
 def _lag(response: complex) -> float:
-    """Return the phase [deg] as the page has it, from -360 to 0: a lever lags the floor, or starts against it at
-    -180.
+    """Return the phase [deg] as the page has it, from -360 to 0.
+
+    A lever lags the floor, or starts against it at -180.
     """
     return -(-math.degrees(cmath.phase(response)) % 360.0)
 

@@ -147,8 +147,9 @@ class Picture:
         return self.values[message][name] if self.is_fresh(message) and message in self.values else NAN
 
     def wrong_contract(self) -> str | None:
-        """Return why what is shown may be misread: the estimator speaks another version of lever.dbc, or an unknown
-        one.
+        """Return why what is shown may be misread.
+
+        The estimator speaks another version of lever.dbc, or an unknown one.
         """
         contract = self.identity.contract
         if contract is not None:

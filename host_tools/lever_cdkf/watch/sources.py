@@ -111,8 +111,9 @@ class Source(ABC):
         return [self._waiting.popleft() for _ in range(len(self._waiting))]
 
     def command(self, values: Mapping[str, codec.Value]) -> None:
-        """Send a COMMAND: the fields of the message, and of the ones before as far as they are not acknowledged;
-        those not given change nothing. Raise LeverError.
+        """Send a COMMAND: the fields of the message, and of the ones before as far as they are not acknowledged.
+
+        Those not given change nothing. Raise LeverError.
         """
         if not self.takes_commands:
             raise LeverError(f"{self.title} takes no commands")
@@ -121,8 +122,10 @@ class Source(ABC):
         self._tries = [self._send(self._pending)]
 
     def acknowledged(self, ack: Mapping[str, float]) -> None:
-        """Take the fields of a COMMAND_ACK. What is out of sequence is not refused for good: the last sender may
-        have stopped at this counter, or a moment ago.
+        """Take the fields of a COMMAND_ACK.
+
+        What is out of sequence is not refused for good: the last sender may have stopped at this counter, or a moment
+        ago.
         """
         result = result_of(ack)
         own = bool(self._pending) and int(ack["command_counter"]) in self._tries
@@ -137,8 +140,9 @@ class Source(ABC):
             self._pending = {}
 
     def keep_alive(self) -> None:
-        """Repeat a COMMAND when it is time: one that is not acknowledged, or any, so that dither asked for here goes
-        on. To be called several times a second as long as somebody watches it.
+        """Repeat a COMMAND when it is time: one that is not acknowledged, or any, so that dither goes on.
+
+        That is dither asked for here. To be called several times a second as long as somebody watches it.
         """
         if time.monotonic() - self._commanded < KEEP_ALIVE:
             return
@@ -157,8 +161,9 @@ class Source(ABC):
             self.command({"dither_rms": 0.0})
 
     def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
-        """Return what is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈
-        [rad/(m/s²)] at the frequencies [Hz]. None where that is not known.
+        """Return what is true now, which the estimator never sees; None where that is not known.
+
+        It is parameters and dynamics by name, and θ/z̈ [rad/(m/s²)] at the frequencies [Hz].
         """
         return None
 
@@ -209,8 +214,9 @@ class BusSource(Source):
         self._bus.shutdown()
 
     def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
-        """Return what is true now, which the estimator never sees: parameters and dynamics by name, and θ/z̈
-        [rad/(m/s²)] at the frequencies [Hz]. None where that is not known.
+        """Return what is true now, which the estimator never sees; None where that is not known.
+
+        It is parameters and dynamics by name, and θ/z̈ [rad/(m/s²)] at the frequencies [Hz].
         """
         return None
 
@@ -274,8 +280,9 @@ class LogSource(Source):
         picture.take(batch, now)
 
     def _frames(self) -> Iterator[tuple[float, Frame]]:
-        """Yield each frame with the time after the one before it [s]; a clock that went back or jumped far counts as
-        0.
+        """Yield each frame with the time after the one before it [s].
+
+        A clock that went back or jumped far counts as 0.
         """
         from ..can.bulk import ERROR as ERROR_FRAME
 

@@ -44,6 +44,7 @@ class Geometry:
         self, model: str, parameters: Sequence[float], trim: float, sent: Sequence[Feedthrough]
     ) -> Response | None:
         """Return the response of `model` with its parameters about the trim angle [rad]; None if any is not known.
+
         The band is that of FEEDTHROUGH, a value a frequency of it, and between those by straight lines.
         """
         if not np.isfinite([*parameters, trim]).all():

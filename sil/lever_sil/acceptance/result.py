@@ -15,17 +15,17 @@ Values = FloatArray
 
 
 def mean(values: Values) -> float:
-    """Return all runs as one number."""
+    """Return the mean over all runs."""
     return float(np.mean(values))
 
 
 def largest(values: Values) -> float:
-    """Likewise."""
+    """Return the largest over all runs."""
     return float(np.max(values))
 
 
 def least(values: Values) -> float:
-    """Likewise."""
+    """Return the least over all runs."""
     return float(np.min(values))
 
 

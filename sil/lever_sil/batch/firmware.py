@@ -116,7 +116,7 @@ def _track(notes: _Notes) -> Track:
 def closed_loop(
     config: Config, motion: Motion, seeds: Sequence[int], loop: ClosedLoop, tick: Callable[[], None]
 ) -> tuple[Recording, Track]:
-    """Return the firmware dithers the lever itself, and samples are lost at random; `tick` is called now and then.
+    """Run the firmware, which dithers the lever itself, and lose samples at random; `tick` is called now and then.
 
     A lost sample lacks what LEVER_SAMPLE carries, theta, theta_dot and tau_m, or never comes at all. The motor holds
     the last torque that it was asked for.

@@ -319,7 +319,7 @@ def _base_late(milliseconds: float) -> Callable[[Plan], Plan]:
 
 
 def _softening(plan: Plan) -> Plan:
-    """Return the grip loses 40 % of its stiffness at 45 s."""
+    """Have the grip lose 40 % of its stiffness at 45 s."""
     k_p = pilots.arm(plan.seed, pilots.SLACK)["k_p"]
     ramp = {"kind": "ramp", "first": f"{k_p} N/m", "last": f"{0.6 * k_p} N/m", "start": "45 s", "duration": "0.05 s"}
     return replace(plan, pilot={**plan.pilot, "k_p": ramp})

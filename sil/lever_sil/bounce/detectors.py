@@ -46,7 +46,7 @@ class Watched:
 
     @classmethod
     def of(cls, theta: FloatArray, z_ddot: FloatArray, period: float) -> Watched:
-        """Return means over a sample period of theirs, of signals so many seconds apart."""
+        """Return means over a sample period of the detectors, of signals whose samples are `period` [s] apart."""
         step = round(1.0 / (RATE * period))
         count = len(theta) // step * step
         return cls(*(signal[:count].reshape(-1, step).mean(axis=1) for signal in (theta - theta[0], z_ddot)))

@@ -155,7 +155,7 @@ class Flown:
 
 
 def fly(plan: Plan) -> Flown:
-    """Return one flight. Raise LeverError."""
+    """Fly one flight. Raise LeverError."""
     scenario = plan.scenario
     inputs = scenario_inputs.prepare(scenario)
     loop = Loop(scenario, inputs, by_frames=False, every=STRIDE)

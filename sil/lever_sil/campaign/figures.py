@@ -35,7 +35,7 @@ def names(model: str) -> tuple[str, ...]:
 
 
 def of_run(flight: Flight, track: Track, run: int) -> Figures:
-    """Return the of run of run `run` of a track, whose truth is that of `flight`. Raise BrokenDownError."""
+    """Return the figures of run `run` of a track, whose truth is that of `flight`. Raise BrokenDownError."""
     counted = flight.judged
     values = track.values[run]
     broken = ~(np.abs(values) < _MOST).all(axis=1)

@@ -165,7 +165,7 @@ def _count(number: int, what: str) -> str:
 
 
 def _one(chosen: Spec, args: argparse.Namespace) -> int:
-    """Return a run alone."""
+    """Make and print one run alone."""
     from lever_cdkf.cli.tables import print_tables
 
     from ..campaign import design

@@ -25,7 +25,7 @@ def least(figure: str, value: float) -> Limit:
 
 
 def right(rms: float, covered: float = 90.0) -> tuple[Limit, ...]:
-    """Return the right of the natural frequency [%]."""
+    """Return the limits within which the natural frequency is right [%]."""
     return most("f_n rms", rms), least("f_n covered", covered)
 
 

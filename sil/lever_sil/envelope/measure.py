@@ -108,7 +108,7 @@ def _unflagged(outcome: Outcome) -> Values:
 
 
 def _silent(outcome: Outcome) -> Values:
-    """Return seconds in a row."""
+    """Return for how many seconds in a row estimates are wrong without a flag, at most."""
     wrong = _unflagged_deviation(outcome) > measures.WRONG
     step = outcome.track.time[1] - outcome.track.time[0]
     return np.array([step * measures.longest(each) for each in wrong.T])
@@ -119,7 +119,7 @@ def _silent_share(outcome: Outcome) -> Values:
 
 
 def _changes(outcome: Outcome) -> Values:
-    """Return an hour; changes while CHANGE still shows the last are not told from it."""
+    """Return the changes an hour; those that come while CHANGE still shows the last are not told from it."""
     shown = outcome.flagged(fault_mask("CHANGE"))[outcome.judged]
     hours = len(shown) * (outcome.track.time[1] - outcome.track.time[0]) / 3600.0
     rate: Values = np.sum(shown[1:] & ~shown[:-1], axis=0) / hours
@@ -212,7 +212,7 @@ def _sigma_ratio(outcome: Outcome) -> Values:
 
 
 def _judged_feedthrough(outcome: Outcome) -> tuple[NDArray[np.complex128], Feedthrough]:
-    """Return True theta/z_ddot, and the firmware's at the judged times."""
+    """Return the true theta/z_ddot, and the firmware's at the judged times."""
     truth, stated = outcome.recording.response, outcome.track.feedthrough
     if truth is None or stated is None:
         raise ValueError("this condition has no theta/z_ddot")
@@ -229,7 +229,7 @@ def _response_rms(outcome: Outcome) -> Values:
 
 
 def _response_covered(outcome: Outcome) -> Values:
-    """Return gain and phase both."""
+    """Return the share of times and frequencies at which both gain and phase are within ±2 sigma [%]."""
     truth, stated = _judged_feedthrough(outcome)
     ratio = truth / stated.response
     gain = np.abs(np.abs(ratio) - 1.0) <= 2.0 * stated.gain_sigma

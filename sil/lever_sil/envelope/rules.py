@@ -85,7 +85,7 @@ _NO_CHANGE = (
 
 
 def _stick_slip(name: str, title: str, motion: Motion, start: float) -> Condition:
-    """Return the base moves a lever that friction holds in between: there is nothing in it to learn."""
+    """Return a condition in which the base moves a lever that friction holds in between: there is nothing to learn."""
     return Condition(
         name,
         title,
@@ -168,7 +168,7 @@ _LOST = (
 
 
 def _large(name: str, title: str, motion: Motion) -> Condition:
-    """Return the lever moves so far that a linear model is none."""
+    """Return a condition in which the lever moves so far that a linear model is none."""
     return Condition(
         name, title, motion, (least("f_n covered", 88.0), most("silent share", 1.0)), also=("silent", *_OF_ARM)
     )

@@ -124,7 +124,7 @@ class Loop:
         loop.health = self.struct.array("struct lever_health", self._healths, self._healths.dtype)
 
     def _fill_cabin(self, flight: Flight) -> FloatArray:
-        """Return a helicopter in hover; return z_ddot as its pilot feels it, of which the first value is known."""
+        """Put in a helicopter in hover; return z_ddot as its pilot feels it, of which the first value is known."""
         inputs, struct, cabin = self._inputs, self.struct, self.struct.pointer.cabin
         felt = inputs.z_ddot.copy()
         cabin.exists, cabin.period, cabin.rest = True, self._scenario.period, float(inputs.truth.rest[0])

@@ -37,7 +37,7 @@ def move(truth: Truth, conditions: Conditions, command: FloatArray) -> tuple[Flo
 
 
 def outside(truth: Truth) -> float:
-    """Return the outside of the cabin's speed, what a pilot feels besides its acceleration [1/s]."""
+    """Return by how much a pilot feels the cabin's speed besides its acceleration [1/s]."""
     return truth.hand.outside if isinstance(truth, mayo_plant.Mayo) else 0.0
 
 
@@ -60,7 +60,7 @@ def fill(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> No
 
 
 def _columns(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> _Columns:
-    """Return the coefficients; puts what else there is of a kind into the plant."""
+    """Return the coefficients; put what else there is of a kind into the plant."""
     if isinstance(truth, linear_plant.LinearTruth):
         system = truth.system
         return system.stiffness, system.damping, system.gain, system.compliance, system.rest

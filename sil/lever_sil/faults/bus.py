@@ -164,7 +164,7 @@ def short(message: str, length: int) -> Fault:
 
 
 def marked(message: str, mark: int) -> Fault:
-    """Return another node sends frames of the same identifier that are extended, remote or error frames."""
+    """Have another node send frames of the same identifier that are extended, remote or error frames."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         at = bus.sent(message, time)
@@ -180,7 +180,7 @@ def marked(message: str, mark: int) -> Fault:
 
 
 def repeated(message: str) -> Fault:
-    """Return each frame comes twice."""
+    """Have each frame come twice."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         at = bus.sent(message, time)
@@ -223,7 +223,7 @@ def hanging_command() -> Fault:
 
 
 def flood(values: Sequence[Mapping[str, codec.Value]], last: Mapping[str, codec.Value], each: int = 1) -> Fault:
-    """Return a new COMMAND in each sample, or several, which take turns; then one that sets things right again."""
+    """Send a new COMMAND in each sample, or several, which take turns; then one that sets things right again."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         bus.lose(bus.sent("COMMAND", time))
@@ -251,7 +251,7 @@ def flood(values: Sequence[Mapping[str, codec.Value]], last: Mapping[str, codec.
 
 
 def lost(messages: str | Sequence[str], share: float) -> Fault:
-    """At random."""
+    """Lose this share of the frames of a message at random."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         at = bus.sent(messages, time)
@@ -261,7 +261,7 @@ def lost(messages: str | Sequence[str], share: float) -> Fault:
 
 
 def samples_lost(share: float) -> Fault:
-    """Return all messages of a sample, at random."""
+    """Lose all messages of a sample, at random."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         gone = bus.random.random(bus.count) < share
@@ -322,7 +322,7 @@ def foreign_load() -> Fault:
 
 
 def babble(every: int) -> Fault:
-    """Return another node sends random data with the identifiers of our inputs."""
+    """Have another node send random data with the identifiers of our inputs."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         inputs = [codec.message(name).frame_id for name in (*SAMPLES, "COMMAND")]
@@ -335,7 +335,7 @@ def babble(every: int) -> Fault:
 
 
 def duplicate() -> Fault:
-    """Return a second estimator: its IDENTITY each second."""
+    """Have a second estimator send its IDENTITY each second."""
 
     def spoil(bus: Bus, time: Interval) -> None:
         at = bus.samples(time)[:: round(1.0 / bus.period)]

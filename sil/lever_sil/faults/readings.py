@@ -68,7 +68,7 @@ def stuck(signal: str) -> Fault:
 
 
 def reads(signal: str, value: float) -> Fault:
-    """Return a fault: the signal has this value, whatever is true."""
+    """Have the signal read this value, whatever is true."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         readings.of[signal].factor[during], readings.of[signal].error[during] = 0.0, value
@@ -77,7 +77,7 @@ def reads(signal: str, value: float) -> Fault:
 
 
 def scaled(signal: str, factor: float) -> Fault:
-    """Return its gain changes by this factor."""
+    """Change the gain of the signal by this factor."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         readings.of[signal].factor[during] *= factor
@@ -86,7 +86,7 @@ def scaled(signal: str, factor: float) -> Fault:
 
 
 def gain_drift(signal: str, factor: float) -> Fault:
-    """Return its gain goes to this factor, at a steady rate."""
+    """Let the gain of the signal go to this factor, at a steady rate."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         readings.of[signal].factor[during] *= np.linspace(1.0, factor, len(during))
@@ -104,7 +104,7 @@ def step(signal: str) -> Fault:
 
 
 def drift(signal: str) -> Fault:
-    """Return an offset grows to the same."""
+    """Let an offset grow to that of step(), at a steady rate."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         readings.of[signal].error[during] += STEP[signal] * np.linspace(0.0, 1.0, len(during))

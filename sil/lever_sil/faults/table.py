@@ -63,7 +63,7 @@ def lines(results: Sequence[RowResult]) -> list[Row]:
 
 
 def _whole(result: RowResult, figure: str) -> str:
-    """Return a figure that not all rows have."""
+    """Return the worst of a figure that not all rows have; empty for a row without it."""
     if not result.row.requirement.flags:
         return ""
     value = result.worst(figure)

@@ -113,7 +113,7 @@ class _Tape:
         return self.inputs.sensed
 
     def finished(self) -> Recording:
-        """Return the whole."""
+        """Return the whole recording."""
         data = np.frombuffer(bytes(self.data), dtype=np.uint8).reshape(-1, 8)
         return Recording(
             self.scenario,

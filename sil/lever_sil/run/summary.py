@@ -283,7 +283,7 @@ def _verdict_truth(summary: SimulationSummary) -> str:
 
 
 def kept_limits(*summaries: SimulationSummary) -> str:
-    """Return that the limits of the scenario are kept. They are the estimate's alone where the loop was unstable."""
+    """Say that the limits of the scenario are kept; they are the estimate's alone where the loop was unstable."""
     unstable = any(each.stability is not None and each.stability.unstable_s for each in summaries)
     return "The estimate keeps its limits, in a loop that was unstable." if unstable else "All limits kept."
 

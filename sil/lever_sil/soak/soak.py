@@ -155,7 +155,7 @@ def run(hours: float, seed: int, show: Show) -> SoakResult:
 
 
 def _fly(scenario: Scenario, estimator: Estimator, number: int) -> Sums:
-    """Return one flight; the instance goes on from the one before."""
+    """Fly one flight; the instance goes on from the one before."""
     inputs = scenario_inputs.prepare(scenario)
     every = round(STRIDE / scenario.period)
     before = estimator.health()

@@ -95,7 +95,7 @@ def candidate(name: str) -> Estimator:
 
 
 def _run(make: Callable[[], Candidate], batch: Batch, at: NDArray[np.int64]) -> Estimates:
-    """Return one run after the other. A numpy.linalg.LinAlgError ends a run: it has broken down."""
+    """Estimate one run after the other. A numpy.linalg.LinAlgError ends a run: it has broken down."""
     p = np.full((batch.runs, len(at), PARAMETERS), np.nan)
     covariance = np.full((*p.shape, PARAMETERS), np.nan)
     config, wanted, states_any = Config(batch.model, batch.period, batch.knowledge), set(at.tolist()), False

@@ -21,8 +21,9 @@ COUNT_COLOURS = {"lost": "estimate", "corrupt": "torque", "late": "base"}
 
 
 def timeline(run: Run) -> Figure | None:
-    """Return a row for each mode and each fault that occurred, with a bar whenever it was present; below it the
-    counts.
+    """Return a row for each mode and each fault that occurred, with a bar whenever it was present.
+
+    Below it are the counts.
     """
     mode, faults = run.column("mode"), run.column("faults")
     if mode is None or faults is None:

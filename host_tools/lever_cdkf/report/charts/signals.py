@@ -83,8 +83,9 @@ def _stretches(run: Run, seconds: float) -> dict[str, float]:
 
 
 def innovations(run: Run, seconds: float = 0.25) -> Figure | None:
-    """Return normalised innovation squared per output, averaged over short stretches, and the band that chance alone
-    gives.
+    """Return the normalised innovation squared per output, averaged over short stretches.
+
+    With it is the band that chance alone gives.
     """
     averages = run.innovations(seconds)
     if averages is None or not (filled := averages.freedom > 0).any():

@@ -40,8 +40,9 @@ def accuracy(run: Run) -> Accuracy | None:
 
 
 def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
-    """Return gain margin, frequency and correction over time, and when there is warning or alarm; `limits` [dB] of
-    these.
+    """Return gain margin, frequency and correction over time, and when there is warning or alarm.
+
+    `limits` [dB] are those of warning and alarm.
     """
     gain, sigma, state = (run.column(name) for name in ("gain_margin_dB", "gain_margin_sigma_dB", "bounce"))
     frequency = run.column("bounce_frequency_Hz")

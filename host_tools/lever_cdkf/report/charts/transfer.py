@@ -116,8 +116,9 @@ def slices(run: Run) -> Figure | None:
 
 
 def _bands(run: Run, time: Array, estimate: np.ndarray) -> list[list[tuple[Array, Array]]]:
-    """Return low and high edge over BAND, of magnitude and of phase, at each time: ±2σ of what was sent, between its
-    frequencies by straight lines. Nothing where nothing was sent.
+    """Return the low and high edge over BAND, of magnitude and of phase, at each time.
+
+    They are ±2σ of what was sent, between its frequencies by straight lines. Nothing where nothing was sent.
     """
     sent = run.feedthrough.at(time)
     if not np.isfinite(sent["gain_sigma"] + sent["phase_sigma"]).all(axis=1).any():

@@ -102,7 +102,7 @@ class Case(ABC):
         return None
 
     def runs(self, plan: Plan) -> int:
-        """Return how many."""
+        """Return how many runs there are."""
         return plan.seeds
 
     def length(self, plan: Plan) -> float:
@@ -309,7 +309,7 @@ class Recorded(Case):
         return judged
 
     def change(self, plan: Plan) -> float | None:
-        """Return the last one."""
+        """Return when the parameters jump last [s]; None where they do not."""
         jumps = [jump for jump in self._scenario.changes() if 0.0 < jump < self.length(plan)]
         return jumps[-1] if jumps else None
 

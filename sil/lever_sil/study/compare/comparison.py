@@ -87,7 +87,7 @@ def differences(
 
 
 def _difference(more: float, error: float, runs: int, counted: float) -> Difference:
-    """Return `counted`: for how many comparisons it stands."""
+    """Return a difference; `counted`: for how many comparisons it stands."""
     t = abs(more) / error if error > 0.0 else (math.inf if more else 0.0)
     return Difference(more, error, runs, min(1.0, counted * 2.0 * float(stdtr(runs - 1, -t))))
 
@@ -105,7 +105,7 @@ def of_errors(case: str, squares: Mapping[str, Array], reference: str | None = N
 
 
 def of_times(case: str, times: Mapping[str, Array]) -> Differences:
-    """Return the of times of the median over runs of times (B,) [s] by name of estimator."""
+    """Return the differences of the median over runs of times (B,) [s] by name of estimator."""
     together = np.stack(list(times.values()), axis=1)
 
     def logarithms(rows: Array, axis: int) -> Array:

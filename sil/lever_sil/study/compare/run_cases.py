@@ -101,7 +101,7 @@ def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> Result
 
 
 def do(task: Task) -> tuple[Task, Outcome | References | None]:
-    """Return one task."""
+    """Do one task."""
     if task.entrant is not None and is_candidate(task.entrant):
         enter(task.entrant)  # in this process
     case = cases()[task.case]

@@ -99,7 +99,7 @@ def _firmware(condition: Condition, signals: Mapping[str, Array], response: bool
 
 
 def _closed_loop(condition: Condition, loop: ClosedLoop, seeds: Sequence[int], trim: Array) -> Log:
-    """Return the firmware dithers by itself, so that its log is part of its run; what was lost is drawn as there."""
+    """Return the log of a firmware that dithers by itself, as part of its run; what was lost is drawn as there."""
     config = Config(settings=condition.settings)
     recording, track = firmware.closed_loop(config, condition.motion, seeds, loop, lambda: None)
     signals = measured(recording, Sensors(), seeds)

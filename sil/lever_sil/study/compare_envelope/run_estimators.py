@@ -69,7 +69,7 @@ def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> list[E
 
 
 def do(task: Task) -> tuple[Task, list[EstimatorResult]]:
-    """Return one task."""
+    """Do one task."""
     ready = list(logs([conditions.CONDITIONS[name] for name in task.conditions], task.seeds))
     results = []
     for name in task.estimators:

@@ -38,7 +38,7 @@ def build(figures: Sequence[Figure | MapFigure]) -> str:
 
 
 def _charts(page: Page, figure: Figure | MapFigure) -> str:
-    """Return side by side where there is room for them."""
+    """Return the charts of a figure, side by side where there is room for them."""
     if isinstance(figure, MapFigure):
         return page.figure(f"{figure.name}-0", maps.spec(figure), "")
     charts = [
