@@ -1,5 +1,6 @@
-"""How good estimates are, for every table: errors, coverage, time to settle, consistency, and for how long an error
-goes without a flag.
+"""How good estimates are, for every table.
+
+It is told by errors, coverage, time to settle, consistency, and for how long an error goes without a flag.
 
 All functions are pure. Errors are estimate minus truth, or relative to it; `axis` is that of numpy: over what is taken
 together, all of it by default.
@@ -58,8 +59,9 @@ def longest(true: BoolArray) -> int:
 
 
 def covariance_of(sigma: Array, correlation: Array) -> Array:
-    """Return (..., 3, 3) of standard deviations (..., 3) and correlations (..., 3): of the first and second, the first
-    and third, the second and third.
+    """Return (..., 3, 3) of standard deviations (..., 3) and correlations (..., 3).
+
+    The correlations are those of the first and second, the first and third, the second and third.
     """
     matrix = np.zeros((*sigma.shape, 3))
     matrix[..., range(3), range(3)] = 1.0
@@ -70,8 +72,9 @@ def covariance_of(sigma: Array, correlation: Array) -> Array:
 
 
 def normalised_squares(errors: Array, covariance: Array) -> Array:
-    """Return (...) eᵀ P⁻¹ e of errors (..., n) with stated covariances (..., n, n): NEES; infinite for a singular
-    one.
+    """Return (...) eᵀ P⁻¹ e of errors (..., n) with stated covariances (..., n, n): NEES.
+
+    It is infinite for a singular one.
     """
     regular = np.linalg.slogdet(covariance).sign != 0.0
     invertible = np.where(regular[..., None, None], covariance, np.eye(covariance.shape[-1]))
@@ -80,8 +83,9 @@ def normalised_squares(errors: Array, covariance: Array) -> Array:
 
 
 def first_without(true: BoolArray, count: int) -> Any:
-    """Return (...) where along (..., T) the first `count` in a row that are not true begin; infinite where there are
-    none.
+    """Return (...) where along (..., T) the first `count` in a row that are not true begin.
+
+    It is infinite where there are none.
     """
     blocked = np.lib.stride_tricks.sliding_window_view(true, count, axis=-1).any(axis=-1)
     return np.where(blocked.all(axis=-1), np.inf, blocked.argmin(axis=-1))

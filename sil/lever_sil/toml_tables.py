@@ -96,8 +96,9 @@ def parse(content: bytes, file: str) -> dict[str, Any]:
 
 
 def value_of(written: str) -> Any:
-    """Return what KEY=VALUE of a command line gives: TOML when it is TOML, otherwise a string, so that a shell needs
-    no second quotes.
+    """Return what KEY=VALUE of a command line gives.
+
+    It is TOML when it is TOML, otherwise a string, so that a shell needs no second quotes.
     """
     try:
         return toml_text.parse(f"value = {written}".encode())["value"]
@@ -217,8 +218,9 @@ def read_table(kind: type[T]) -> Reader:
 
 
 def table(kind: type[T]) -> Any:
-    """Return a field that holds a nested table; a missing one is read as an empty one, so that its own defaults
-    hold.
+    """Return a field that holds a nested table.
+
+    A missing one is read as an empty one, so that its own defaults hold.
     """
     return dataclasses.field(default_factory=lambda: kind(), metadata={"read": read_table(kind)})
 

@@ -32,8 +32,9 @@ class Excerpt:
     flagged: BoolArray
 
     def chart(self, sigmas: float, moments: Iterable[float]) -> Figure:
-        """Return the estimate with a band of so many standard deviations, over time; dots at the foot where it is
-        flagged, and lines at the moments [s].
+        """Return the estimate with a band of so many standard deviations, over time.
+
+        There are dots at the foot where it is flagged, and lines at the moments [s].
         """
         floor, ceiling = self._limits()
         figure = Figure(

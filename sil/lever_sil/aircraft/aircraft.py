@@ -63,8 +63,10 @@ MOST_MODES = 3
 
 @dataclass(frozen=True, kw_only=True)
 class Mode:
-    """[[mode]]: a bending mode of the fuselage. Amplitudes are relative to the heave that the same force at the rotor
-    makes of the rigid aircraft: its modal mass is the aircraft's mass, or the amplitudes are scaled so that it is.
+    """[[mode]]: a bending mode of the fuselage.
+
+    Amplitudes are relative to the heave that the same force at the rotor makes of the rigid aircraft: its modal mass is
+    the aircraft's mass, or the amplitudes are scaled so that it is.
     """
 
     frequency: float = quantity("Hz", above=0.0, greatest=50.0)
@@ -94,8 +96,9 @@ class Aircraft(ABC):
 
     @abstractmethod
     def mounted(self) -> StateSpace:
-        """Return the airframe: inputs theta_c [rad] and gust [m/s^2], outputs z_ddot at the seat and at the
-        accelerometer.
+        """Return the airframe from pitch and gust to seat and accelerometer.
+
+        Inputs are theta_c [rad] and gust [m/s^2], outputs z_ddot at the seat and at the accelerometer.
         """
 
     @property
@@ -111,8 +114,9 @@ class Aircraft(ABC):
         return StateSpace(airframe.a, airframe.b, airframe.c[[SEAT, SEAT]], airframe.d[[SEAT, SEAT]])
 
     def response(self, s: ComplexArray, place: int = SEAT) -> ComplexArray:
-        """z_ddot at one of the places / delta [m/s^2 per rad] at the complex frequencies s [rad/s], for a gearing of 1,
-        without limits.
+        """Return z_ddot at one of the places / delta [m/s^2 per rad] at the complex frequencies s [rad/s].
+
+        It is that for a gearing of 1, without limits.
         """
         response = self.airframe().response(s, place, PITCH)
         if self.has_actuator:
@@ -191,8 +195,9 @@ class FromFile(Aircraft):
 
 @dataclass(frozen=True, kw_only=True)
 class Imported(FromFile):
-    """An airframe from a file: state_space.py. Numbers of inputs and outputs count from 1; 0: the first and the second
-    of a file that has no more.
+    """An airframe from a file: state_space.py.
+
+    Numbers of inputs and outputs count from 1; 0: the first and the second of a file that has no more.
     """
 
     input: str = choice("blade", "actuator", default="blade")
@@ -207,8 +212,9 @@ class Imported(FromFile):
         return self.input == "blade"
 
     def picked(self, whole_system: StateSpace, where: str) -> StateSpace:
-        """Return two inputs and two outputs of all that a file has. Without a gust there, it accelerates both places
-        alike. Raise LeverError.
+        """Return two inputs and two outputs of all that a file has; raise LeverError.
+
+        Without a gust there, it accelerates both places alike.
         """
         inputs = _chosen(
             (self.collective_input, self.gust_input), whole_system.d.shape[1], ("collective", "gust"), where
@@ -258,8 +264,9 @@ FILES = (".mat", ".npz", ".csv")
 
 
 def load(name_or_path: str, **changes: Any) -> Aircraft:
-    """Return the aircraft of that name, or in the file of that path (ending in .toml, .mat, .npz or .csv), with some
-    of its keys changed: values as they stand in a .toml file. Raise LeverError.
+    """Return the aircraft of that name, or in a file, with some of its keys changed; raise LeverError.
+
+    The path of a file ends in .toml, .mat, .npz or .csv; `changes` are values as they stand in a .toml file.
     """
     path, place = Path(name_or_path), Place(name_or_path)
     if path.suffix.lower() not in FILES:
@@ -295,8 +302,9 @@ def keys(model: str) -> list[str]:
 
 
 def read_aircraft(values: Any, place: Place) -> Coupled:
-    """Reader of the table [aircraft] of a scenario: `model` is a name or a file, `gearing` the pitch over the lever's
-    angle, and every other key one of the aircraft's.
+    """Read the table [aircraft] of a scenario.
+
+    `model` is a name or a file, `gearing` the pitch over the lever's angle, and every other key one of the aircraft's.
     """
     if not isinstance(values, dict):
         raise place.error(f"{values!r} is not a table")

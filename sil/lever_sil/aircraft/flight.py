@@ -24,8 +24,9 @@ class Flight:
     """Starts in hover, trimmed. All angles are deviations from the trim."""
 
     def __init__(self, coupled: Coupled, period: float, gust: FloatArray) -> None:
-        """`gust`: vertical force over mass [m/s^2] at the samples, which are `period` [s] apart, no more than the
-        aircraft's delay.
+        """Start at the first sample; samples are `period` [s] apart, no more than the aircraft's delay.
+
+        `gust`: vertical force over mass [m/s^2] at the samples.
         """
         self.constants = constants = Constants.of(coupled.aircraft, period)
         self.gearing, self.gust = coupled.gearing, gust
@@ -37,9 +38,10 @@ class Flight:
         """At this sample, at the pilot's seat and at the accelerometer [m/s^2]."""
 
     def advance(self, delta: float, correction: float = 0.0) -> float:
-        """z_ddot at the seat at the next sample [m/s^2]; `delta`: angle of the lever about its trim at this one [rad];
-        `correction`: what is put out now to be added to that angle [rad], which takes a sample period and the
-        aircraft's correction_delay.
+        """Go on to the next sample; return z_ddot at the seat there [m/s^2].
+
+        `delta`: angle of the lever about its trim at this sample [rad]; `correction`: what is put out now to be added
+        to that angle [rad], which takes a sample period and the aircraft's correction_delay.
         """
         now, constants = len(self._lever), self.constants
         late = constants.correction_delay
@@ -129,9 +131,10 @@ def limited(value: float, most: float) -> float:
 
 
 def first_order_hold(a: FloatArray, b: FloatArray, step: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return matrices of x and of the input at both ends of a step [s], over which the input is linear: the
-    exponential of [[A, B, 0], [0, 0, 1/step], [0, 0, 0]] (van Loan 1978), by its series of a part of the step,
-    squared.
+    """Return matrices of x and of the input at both ends of a step [s], over which the input is linear.
+
+    They are the exponential of [[A, B, 0], [0, 0, 1/step], [0, 0, 0]] (van Loan 1978), by its series of a part of the
+    step, squared.
     """
     n, m = b.shape
     whole = np.zeros((n + 2 * m, n + 2 * m))

@@ -33,9 +33,10 @@ _AT_SEAT = 1e-6
 
 
 def known_response(coupled: Coupled, off: Response | None = None, **said: Any) -> AircraftResponse:
-    """Return what a firmware is told of an aircraft: the response at the seat and the way from the accelerometer to
-    there, or where that is not known, the response at the accelerometer. `off`: both are wrong by a factor; the one
-    of the way is `seat_off` in `said`.
+    """Return what a firmware is told of an aircraft.
+
+    It is the response at the seat and the way from the accelerometer to there, or where that is not known, the response
+    at the accelerometer. `off`: both are wrong by a factor; the one of the way is `seat_off` in `said`.
     """
     craft, factor = coupled.aircraft, off or (lambda s: np.ones_like(s))
     seat_off: Response = said.pop("seat_off", factor)
@@ -56,15 +57,17 @@ def measured_response(measured: Tabulated, **said: Any) -> AircraftResponse:
 
 
 def seat_modes(s: ComplexArray, between: ComplexArray) -> SeatTransfer:
-    """Return the acceleration at the seat over that at the accelerometer as the firmware takes it, fitted at s
-    [rad/s] on the imaginary axis.
+    """Return the acceleration at the seat over that at the accelerometer as the firmware takes it.
+
+    It is fitted at s [rad/s] on the imaginary axis.
     """
     return _modes(fit(s, between, _SEAT_MODES))
 
 
 def _modes(fitted: Fit) -> SeatTransfer:
-    """Return its poles two by two: r / (s - p) + q / (s - o). A real one that is left over counts twice, with a zero
-    there.
+    """Return the modes of a fit: its poles two by two, r / (s - p) + q / (s - o).
+
+    A real one that is left over counts twice, with a zero there.
     """
     system = fitted.system
     poles, vectors = np.linalg.eig(system.a)
@@ -79,8 +82,9 @@ def _modes(fitted: Fit) -> SeatTransfer:
 
 
 def response_table(response: Response, band: tuple[float, float] = BAND, **said: Any) -> AircraftResponse:
-    """Return the table of z_ddot / delta, which is known in `band` [Hz]; `said` are those of AircraftResponse.
-    Raise LeverError.
+    """Return the table of z_ddot / delta, which is known in `band` [Hz]; raise LeverError.
+
+    `said` are those of AircraftResponse.
     """
     low, high = max(band[0], BAND[0]), min(band[1], BAND[1])
     if low > _NEEDED[0] or high < _NEEDED[1]:
@@ -97,8 +101,10 @@ def response_table(response: Response, band: tuple[float, float] = BAND, **said:
 
 
 def _frequencies(response: Response, low: float, high: float) -> FloatArray:
-    """Return those of the table [Hz]: equal ratios, or where a mode of the fuselage lies between two of them, each
-    where straight lines between the ones before are furthest off.
+    """Return the frequencies of the table [Hz], which are in equal ratios.
+
+    Where a mode of the fuselage lies between two of them, each further one is where straight lines between the ones before
+    are furthest off.
     """
     fine = np.geomspace(low, high, 1000)
     exact = response(2j * np.pi * fine.astype(np.complex128))
@@ -118,7 +124,8 @@ def _frequencies(response: Response, low: float, high: float) -> FloatArray:
 
 
 def alarm_limit(gain_sigma: float) -> float:
-    """Return the gain margin below which there is an alarm where nothing else is said [dB]: with a gain that is too
-    small by gain_sigma [1], LEFT of it are left then.
+    """Return the gain margin below which there is an alarm where nothing else is said [dB].
+
+    With a gain that is too small by gain_sigma [1], LEFT of it are left then.
     """
     return max(ALARM, LEFT - 20.0 * math.log10(1.0 - min(gain_sigma, 0.9)))

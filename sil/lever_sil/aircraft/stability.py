@@ -43,7 +43,7 @@ class Margins:
 
     @property
     def gain_db(self) -> float:
-        """[dB]"""
+        """Return the gain margin [dB]."""
         return float(20.0 * np.log10(self.gain))
 
 
@@ -64,8 +64,9 @@ def margins(loop: Response, band: tuple[float, float] = BAND) -> Margins:
 
 
 def critical_gearing(craft: Aircraft, transfer: Transfer) -> FloatArray:
-    """At which the loop becomes unstable, at each time of a pilot's transfer function [1]: margins() for many times at
-    once, by a grid alone.
+    """Return the gearing at which the loop becomes unstable, at each time of a pilot's transfer function [1].
+
+    It is margins() for many times at once, by a grid alone.
     """
     loop = _response(craft) * transfer.response(_COARSE)
     below, above = loop.imag[:, :-1], loop.imag[:, 1:]
@@ -82,7 +83,7 @@ def _response(craft: Aircraft) -> ComplexArray:
 
 
 def _on_axis(frequency: FloatArray) -> ComplexArray:
-    """s [rad/s] of frequencies [Hz]."""
+    """Return s [rad/s] of frequencies [Hz]."""
     return 2j * np.pi * frequency.astype(np.complex128)
 
 
@@ -101,8 +102,9 @@ def _crossings(loop: Response, frequency: FloatArray, response: ComplexArray) ->
 
 
 def mode(loop: Response, guess: complex) -> complex:
-    """Return the root s [rad/s] of 1 - L(s) near `guess`, by Newton's method: Re s is the growth rate, Im s the
-    frequency.
+    """Return the root s [rad/s] of 1 - L(s) near `guess`, by Newton's method.
+
+    Re s is the growth rate, Im s the frequency.
     """
     s = guess
     for _ in range(50):

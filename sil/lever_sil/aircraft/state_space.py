@@ -54,8 +54,9 @@ class StateSpace:
         return StateSpace(self.a, self.b[:, inputs], self.c[outputs], self.d[np.ix_(outputs, inputs)])
 
     def balanced(self) -> StateSpace:
-        """With states in other units, by powers of two, so that what enters each is as large as what leaves it (after
-        Osborne 1960): rounding is the same in all of them.
+        """Return the system with states in other units, by powers of two (after Osborne 1960).
+
+        What enters each state is then as large as what leaves it: rounding is the same in all of them.
         """
         scale = np.ones(len(self.a))
         for _ in range(20):
@@ -87,8 +88,9 @@ class StateSpace:
         return np.linalg.eigvals(self.a).astype(np.complex128)
 
     def write(self, path: Path, comment: str = "") -> None:
-        """As a .mat, .npz or .csv file, whole or not at all; `comment`: lines that begin with #, of a .csv file. Raises
-        LeverError.
+        """Write the system as a .mat, .npz or .csv file, whole or not at all; raise LeverError.
+
+        `comment`: lines that begin with #, of a .csv file.
         """
         arrays = {name.upper(): value for name, value in vars(self).items()}
         kind = path.suffix.lower()
@@ -212,8 +214,9 @@ _READERS = {".mat": _mat, ".npz": _npz, ".csv": _csv}
 
 
 def flyable(system: StateSpace, where: str) -> StateSpace:
-    """Return an airframe of two inputs and two outputs, balanced and minimal. Raise LeverError where it is
-    unstable, or of another scale than a helicopter.
+    """Return an airframe of two inputs and two outputs, balanced and minimal.
+
+    Raise LeverError where it is unstable, or of another scale than a helicopter.
     """
     system = system.balanced().minimal()
     poles = system.poles()

@@ -1,5 +1,7 @@
-"""An aircraft that is known by its frequency response alone, as a flight test or another simulation gives it: for the
-firmware's table and the linear analysis, and by a state space that is fitted to it (vector_fitting.py) to fly.
+"""An aircraft that is known by its frequency response alone, as a flight test or another simulation gives it.
+
+It serves for the firmware's table and the linear analysis, and by a state space that is fitted to it
+(vector_fitting.py) to fly.
 
 The file is CSV with a row a frequency, rising: frequency [Hz], real and imaginary part of the vertical acceleration at
 the pilot's seat over the lever's angle [(m/s^2)/rad], with gearing, delays and actuator. Where the accelerometer is not
@@ -62,8 +64,9 @@ class Tabulated:
         return cls(columns[0], columns[1] + 1j * columns[2], seat)
 
     def fitted(self, gearing: float, delay: float) -> tuple[StateSpace, float]:
-        """Return a state space of pitch and gust to seat and accelerometer, both of which a gust accelerates,
-        without gearing [1] and delay [s], which are in the table; and its largest relative error [1].
+        """Return a state space of pitch and gust to seat and accelerometer, and its largest relative error [1].
+
+        A gust accelerates both; gearing [1] and delay [s], which are in the table, are left out.
         """
         s = 2j * np.pi * self.frequency.astype(np.complex128)
         values = self.values * np.exp(s * delay) / gearing

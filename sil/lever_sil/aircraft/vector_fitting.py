@@ -1,5 +1,7 @@
-"""A state space from a frequency response, by vector fitting (Gustavsen and Semlyen: Rational approximation of
-frequency domain responses by vector fitting, IEEE Trans. Power Delivery 14, 1999).
+"""A state space from a frequency response, by vector fitting.
+
+The method is that of Gustavsen and Semlyen: Rational approximation of frequency domain responses by vector fitting,
+IEEE Trans. Power Delivery 14, 1999.
 
     f(s) = d + sum r_k / (s - p_k)
 
@@ -33,8 +35,9 @@ class Fit:
 
 
 def fit(s: ComplexArray, values: ComplexArray, most_pairs: int = MOST_PAIRS, good: float = GOOD) -> Fit:
-    """Return the fit with the fewest pairs of poles that is good at every frequency, or the best; s [rad/s] on the
-    imaginary axis.
+    """Return the fit with the fewest pairs of poles that is good at every frequency, or the best.
+
+    s [rad/s] is on the imaginary axis.
     """
     most = max(1, min(most_pairs, (len(s) - 1) // 2))
     found: Fit | None = None

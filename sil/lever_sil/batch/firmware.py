@@ -147,8 +147,9 @@ def closed_loop(
 
 
 class _Notes:
-    """What the estimators of `width` runs say at every STRIDE-th of `count` samples, and with `response` at every
-    RESPONSE_STRIDE-th of these their feedthrough: run first.
+    """What the estimators of `width` runs say at every STRIDE-th of `count` samples; run first.
+
+    With `response` it is also their feedthrough at every RESPONSE_STRIDE-th of these.
     """
 
     def __init__(self, count: int, width: int, response: bool = False) -> None:

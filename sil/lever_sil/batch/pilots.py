@@ -92,7 +92,9 @@ def _of_sil(motion: Motion, seeds: Sequence[int], tick: Callable[[], None]) -> R
 
 
 def _pilot_of_sil(name: str, trim: FloatArray, rng: np.random.Generator) -> Truth:
-    """mayo_* as measured, mayo_random about both; two_dof with an arm that differs from that of its scenario by 10 %
+    """Return the pilot of `lever sim` of that name.
+
+    mayo_* are as measured, mayo_random about both; two_dof has an arm that differs from that of its scenario by 10 %
     (standard deviation).
     """
     lever = lever_plant.Lever.from_settings({row.name: row.default for row in settings_table()})

@@ -42,7 +42,7 @@ class Hardware:
         return self.length**2 * (self.mass_position**2 * self.mass + m_p) + self.inertia
 
     def forcing_mass(self, m_p: FloatArray) -> FloatArray:
-        """mu [kg]."""
+        """Return mu [kg]."""
         return self.mass_position * self.mass + m_p
 
 
@@ -97,8 +97,10 @@ def natural_frequency_and_damping(
 
 
 class BatchPlant:
-    """Levers in motion, by fast/c/lanes.h: `theta` [rad] and `theta_dot` [rad/s] of each lane at the samples so far, at
-    the first at rest at the trim.
+    """Levers in motion, by fast/c/lanes.h.
+
+    `theta` [rad] and `theta_dot` [rad/s] are those of each lane at the samples so far, at the first at rest at the
+    trim.
     """
 
     def __init__(self, lanes: Lanes) -> None:
@@ -138,8 +140,9 @@ class BatchPlant:
 
 
 def grip_force(lanes: Lanes, theta: FloatArray, theta_dot: FloatArray) -> FloatArray:
-    """Return what the arm does to the lever, mean since the last sample [N]; of its weight, which the rest angle
-    balances, nothing. Process noise and disturbance act on the lever.
+    """Return what the arm does to the lever, mean since the last sample [N].
+
+    Of its weight, which the rest angle balances, it is nothing. Process noise and disturbance act on the lever.
     """
 
     def since(values: FloatArray) -> FloatArray:
@@ -158,7 +161,7 @@ def grip_force(lanes: Lanes, theta: FloatArray, theta_dot: FloatArray) -> FloatA
 
 
 def run(lanes: Lanes, tick: Callable[[], None] = lambda: None) -> tuple[FloatArray, FloatArray]:
-    """theta [rad] and theta_dot [rad/s] of every lane at every sample; `tick` is called now and then."""
+    """Return theta [rad] and theta_dot [rad/s] of every lane at every sample; call `tick` now and then."""
     plant = BatchPlant(lanes)
     for first in range(0, plant.count - 1, TICK):
         plant.move(first, min(first + TICK, plant.count - 1))

@@ -34,8 +34,9 @@ class Fault:
 
 @dataclass(frozen=True)
 class Sensors:
-    """Measured is gain times the truth `delay` seconds ago, plus noise. A sigma [1, s] is that of a normal error that
-    each run draws anew.
+    """Measured is gain times the truth `delay` seconds ago, plus noise.
+
+    A sigma [1, s] is that of a normal error that each run draws anew.
     """
 
     z_ddot_gain: float = 1.0

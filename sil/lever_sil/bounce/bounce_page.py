@@ -36,9 +36,7 @@ def build(results: Sequence[BounceResult], seeds: int) -> str:
 
 
 def _chart(shown: Excerpt, flight: str) -> Figure:
-    """Return the margin with the limits of warning and alarm, what the lever does, what the cabin does, and when
-    what came.
-    """
+    """Return the margin with the limits of warning and alarm, what the lever and the cabin do, and when what came."""
     rows = [axis("margin [dB]", range=[-5.0, _MOST], weight=1.5), axis("lever [°]"), axis("cabin [m/s²]")]
     figure = Figure(rows, time_axis(float(shown.time[-1])), height=480)
     margin = np.minimum(shown.margin, _MOST)

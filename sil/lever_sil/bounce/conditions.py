@@ -185,8 +185,9 @@ def _more(**tables: Any) -> Callable[[Plan], Plan]:
 
 
 def _stuck_with(name: str, factor: float) -> Callable[[Plan], Plan]:
-    """Let the firmware take a parameter for so many times what it is, and the others for what they are, and
-    learns nothing.
+    """Let the firmware take a parameter for so many times what it is, and learn nothing.
+
+    It takes the others for what they are.
     """
 
     def spoil(plan: Plan) -> Plan:

@@ -76,8 +76,9 @@ def rover(watched: Watched, response: Response) -> FloatArray:
 def _half_cycle(
     cabin: FloatArray, lever: FloatArray, own: list[int], before: int, now: int, response: Response
 ) -> float:
-    """Return amplitude between two extrema of the cabin's acceleration; 0 if frequency or phase are not the
-    coupling's.
+    """Return the amplitude between two extrema of the cabin's acceleration.
+
+    It is 0 if frequency or phase are not the coupling's.
     """
     frequency = RATE / (2.0 * (now - before))
     index = int(np.searchsorted(own, now, side="right"))

@@ -181,8 +181,9 @@ def fly(plan: Plan) -> Flown:
 
 
 def uncertain_response(plan: Plan) -> AircraftResponse:
-    """Return what the firmware is given of an aircraft: its response, off by what is stated; the way from the
-    accelerometer to the seat is off by up to SEAT_ERROR.
+    """Return what the firmware is given of an aircraft: its response, off by what is stated.
+
+    The way from the accelerometer to the seat is off by up to SEAT_ERROR.
     """
     coupled = plan.scenario.aircraft
     assert coupled is not None

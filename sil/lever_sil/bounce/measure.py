@@ -93,7 +93,7 @@ def geared(plan: Plan, ratio: float) -> Plan:
 
 
 def _loudness(flown: Flown) -> FloatArray:
-    """rms of z_ddot over the last second, at the notes."""
+    """Return the rms of z_ddot over the last second, at the notes."""
     square = np.cumsum(np.append(0.0, flown.z_ddot**2))
     at = np.arange(0, len(flown.time), STRIDE) + 1
     begin = np.maximum(at - 1000, 0)
@@ -102,8 +102,9 @@ def _loudness(flown: Flown) -> FloatArray:
 
 
 def _doubled(flown: Flown) -> float:
-    """From when on the vibration is LOUD times what it was in the first ten seconds, for two seconds at least [s]; the
-    end of the flight: never. A single gust does not count.
+    """Return from when on the vibration is LOUD times what it was in the first ten seconds [s].
+
+    It is that for two seconds at least: a single gust does not count. The end of the flight: never.
     """
     loudness, notes = _loudness(flown), flown.notes
     steady = float(np.median(loudness[(notes > 2.0) & (notes < 10.0)]))
@@ -133,7 +134,7 @@ def _as_it_is(plan: Plan) -> Plan:
 
 
 def relaxing(craft: str, seed: int, *, spoil: Spoil = _as_it_is) -> Measured:
-    """Fly a pilot who relaxes until the loop is unstable: who sees it coming?"""
+    """Fly a pilot who relaxes until the loop is unstable, and tell who sees it coming."""
     flown = fly(geared(spoil(Plan(craft, seed, pilots.relaxing(seed), 1.0, duration=75.0)), BEYOND))
     notes, doubled = flown.notes, _doubled(flown)
     alarm = standing(flown.stability["state"] == lib.LEVER_BOUNCE_ALARM, notes, doubled)
@@ -166,8 +167,9 @@ def _detected(flown: Flown) -> Sequence[tuple[FloatArray, FloatArray, float]]:
 
 
 def _margins(flown: Flown) -> Figures:
-    """Return how right the stated gain margin is, where one is stated and the lever does not swing by more than
-    SWUNG.
+    """Return how right the stated gain margin is.
+
+    It counts where one is stated and the lever does not swing by more than SWUNG.
     """
     every = 25
     said, true = flown.stability[::every], flown.margins(every)
@@ -185,7 +187,7 @@ def _margins(flown: Flown) -> Figures:
 
 
 def stable(craft: str, seed: int, *, duration: float, ratio: float = STABLE, spoil: Spoil = _as_it_is) -> Measured:
-    """Fly a restless pilot in a loop that stays stable: who raises an alarm?"""
+    """Fly a restless pilot in a loop that stays stable, and tell who raises an alarm."""
     flown = fly(geared(spoil(Plan(craft, seed, pilots.restless(seed, duration), 1.0, duration=duration)), ratio))
     alarmed = flown.stability["state"] == lib.LEVER_BOUNCE_ALARM
     (_, rover, rover_limit), (_, spectrum, spectrum_limit) = _detected(flown)
@@ -220,7 +222,7 @@ def raised(plan: Plan, ratio: float, critical: float | None = None) -> Plan:
 
 
 def _vibration(flown: Flown) -> float:
-    """rms of z_ddot [m/s^2]."""
+    """Return the rms of z_ddot [m/s^2]."""
     return float(np.sqrt(np.mean(flown.z_ddot[flown.during(*_JUDGED)] ** 2)))
 
 
@@ -230,8 +232,9 @@ def _uncoupled(plan: Plan) -> float:
 
 
 def largest_gearing(craft: str, seed: int, *, mitigation: str, spoil: Spoil = _as_it_is, **changes: Any) -> Measured:
-    """Up to which gearing the vibration stays below LOUD times that without the lever: in steps of a factor, finer
-    about the first at which it does not.
+    """Return up to which gearing the vibration stays below LOUD times that without the lever.
+
+    It goes in steps of a factor, finer about the first at which the vibration does not.
     """
     plan = spoil(_slack(craft, seed, mitigation, **changes))
     return Measured({"gearing ÷ critical": _largest_quiet(plan, LOUD * _uncoupled(plan))})
@@ -277,8 +280,9 @@ def cancelled(craft: str, seed: int, *, mitigation: str, **changes: Any) -> Meas
 
 
 def _involuntary(flown: Flown) -> tuple[FloatArray, FloatArray]:
-    """Return what cabin and motor alone make of the lever's angle [rad], and what the correction leaves of that; 2
-    to 8 Hz.
+    """Return what cabin and motor alone make of the lever's angle [rad], and what the correction leaves of that.
+
+    Both are from 2 to 8 Hz.
     """
     period = flown.plan.scenario.period
     quiet = Conditions(flown.z_ddot, period, 0.0, 0.0, np.random.default_rng(0))
@@ -315,8 +319,9 @@ VOLUNTARY = 0.5
 
 
 def voluntary(craft: str, seed: int, *, mitigation: str, ratio: float = STABLE, **changes: Any) -> Measured:
-    """Return what the mitigation makes of the pilot's own flying: his trim to the corrected angle, with it over
-    without, at so many times the critical gearing. At 0 the cabin does not answer.
+    """Return what the mitigation makes of the pilot's own flying: his trim to the corrected angle.
+
+    It is that with it over without, at so many times the critical gearing. At 0 the cabin does not answer.
     """
     pilot = pilots.table(pilots.arm(seed, pilots.SLACK))
     moves = {"kind": "sinusoid", "mean": pilot["trim"], "amplitude": "2 deg", "frequency": f"{VOLUNTARY} Hz"}
@@ -354,7 +359,7 @@ def wrong(craft: str, seed: int, *, mitigations: Sequence[str], spoil: Callable[
 
 
 def _lever_in_band(flown: Flown) -> float:
-    """rms of the corrected angle, 2 to 8 Hz [rad]."""
+    """Return the rms of the corrected angle, 2 to 8 Hz [rad]."""
     period = flown.plan.scenario.period
     return float(np.std(_in_band(flown.corrected - flown.truth.rest, period)[flown.during(*_JUDGED)]))
 
@@ -365,8 +370,9 @@ _NOTHING, _NO_TORQUE = math.radians(0.005), 2e-3
 
 
 def faulty(craft: str, seed: int, *, mitigation: str, spoil: Callable[[Plan], Plan]) -> Measured:
-    """Return how soon after a fault correction and torque are zero, and by how much the correction jumps in a
-    sample.
+    """Return how soon after a fault correction and torque are zero.
+
+    With it is by how much the correction jumps in a sample.
     """
     plan = spoil(replace(_slack(craft, seed, mitigation), duration=FAULT + 2.0, dither=0.0))
     flown = fly(raised(plan, CANCELLED_AT))
@@ -379,8 +385,10 @@ def faulty(craft: str, seed: int, *, mitigation: str, spoil: Callable[[Plan], Pl
 
 
 def harmful(craft: str, seed: int, *, mitigation: str, spoil: Spoil) -> Measured:
-    """For how long after a fault the correction adds to the lever's motion: the corrected angle is larger than the
-    lever's, both from 2 to 8 Hz, as rms over a quarter of a second.
+    """Return for how long after a fault the correction adds to the lever's motion.
+
+    It does while the corrected angle is larger than the lever's, both from 2 to 8 Hz, as rms over a quarter of a
+    second.
     """
     plan = spoil(replace(_slack(craft, seed, mitigation), duration=FAULT + 5.0, dither=0.0))
     flown, period = fly(raised(plan, CANCELLED_AT)), plan.scenario.period

@@ -46,8 +46,9 @@ def measure(task: Task) -> Measured:
 
 
 def run(rows: Sequence[Condition], seeds: int, show: Show) -> list[BounceResult]:
-    """Return the results of the rows, in their order, with so many pilots. Rows that measure the same share the
-    flights.
+    """Return the results of the rows, in their order, with so many pilots.
+
+    Rows that measure the same share the flights.
     """
     flown = {row.measure: row for row in reversed(rows)}
     tasks = [Task(row.name, *flight) for row in flown.values() for flight in _flights(row, seeds)]

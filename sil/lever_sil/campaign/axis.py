@@ -40,8 +40,10 @@ def number_of(written: Written) -> tuple[float, str] | None:
 
 @dataclass(frozen=True, kw_only=True)
 class Axis:
-    """[[vary]]: `values` are taken as they are; between the two of `range` there are `steps` in a grid, and any number
-    in other designs.
+    """[[vary]]: an axis of a campaign.
+
+    `values` are taken as they are; between the two of `range` there are `steps` in a grid, and any number in other
+    designs.
     """
 
     key: str = text()

@@ -37,8 +37,9 @@ class Border:
 
 
 def borders(cells: Map, failure: Failure) -> Iterator[Border]:
-    """From the first cell of the x axis on, where the error or the coverage is first beyond its limit; for rows
-    without an empty cell.
+    """Yield where, from the first cell of the x axis on, the error or the coverage is first beyond its limit.
+
+    Only rows without an empty cell have a border.
     """
     rng = np.random.Generator(np.random.Philox(_SEED))
     for name, runs in cells.runs.items():

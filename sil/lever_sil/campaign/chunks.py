@@ -107,8 +107,9 @@ def _code() -> bytes:
 
 
 def fingerprint(spec: Spec) -> str:
-    """Return what the names of a campaign's files begin with: of the spec and of the shared libraries that make its
-    rows.
+    """Return what the names of a campaign's files begin with.
+
+    It is the fingerprint of the spec and of the shared libraries that make its rows.
     """
     return hashlib.sha256(spec.hashed.encode() + _code()).hexdigest()[:16]
 

@@ -15,8 +15,9 @@ _POINT, _ORDER = 0, 1  # purposes of random numbers
 
 
 def point(spec: Spec, number: int) -> dict[str, Written]:
-    """Return what is set at point `number` (from 0): scenario values by dotted key. In a grid the last axis goes
-    fastest.
+    """Return what is set at point `number` (from 0): scenario values by dotted key.
+
+    In a grid the last axis goes fastest.
     """
     if spec.design == "grid":
         return _of_grid(spec, number)

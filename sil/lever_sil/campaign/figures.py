@@ -65,8 +65,9 @@ def of_run(flight: Flight, track: Track, run: int) -> Figures:
 
 
 def _nees(flight: Flight, track: Track, run: int) -> float | None:
-    """Return mean over the judged times of eᵀ P⁻¹ e of the parameters, which is 3 where the stated covariance is
-    right.
+    """Return the mean over the judged times of eᵀ P⁻¹ e of the parameters.
+
+    It is 3 where the stated covariance is right.
     """
     if track.covariance is None or not np.isfinite(flight.truth[:, :PARAMETERS]).all():
         return None

@@ -38,7 +38,7 @@ class Flight:
 
     @property
     def time(self) -> Array:
-        """(T,) [s]"""
+        """Return the times of the samples looked at, (T,) [s]."""
         time: Array = self.at * self.scenario.period
         return time
 
@@ -49,8 +49,9 @@ class Flight:
 
 
 def simulate(scenario: Scenario, every: float, *, measured: bool) -> Flight:
-    """Return a flight, looked at `every` so many seconds; with what was measured if that is asked for. Raises
-    LeverError.
+    """Return a flight, looked at `every` so many seconds; raise LeverError.
+
+    What was measured is in it if that is asked for.
     """
     inputs = scenario_inputs.prepare(scenario)
     step = max(1, round(every / scenario.period))

@@ -87,8 +87,9 @@ def run(plan: Plan, folder: Path, client: Client, show: Show) -> Session:
 def _results(
     client: Client, plan: Plan, folder: Path, todo: Iterator[Chunk], tick: Callable[[], None]
 ) -> Iterator[tuple[Chunk, tuple[int, float] | Exception]]:
-    """Yield the results of each chunk, when it is finished: rows and processor time, or how it killed the workers.
-    Raise LeverError.
+    """Yield the results of each chunk, when it is finished; raise LeverError.
+
+    They are rows and processor time, or how it killed the workers.
 
     Dask blames what kills a worker on all chunks that this worker was given. So these are tried again one by one, and
     only what kills the workers then is given up.

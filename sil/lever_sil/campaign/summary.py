@@ -59,8 +59,9 @@ def build(plan: Plan, folder: Path, session: Session) -> dict[str, Any]:
 
 
 def _factor(plan: Plan, folder: Path, session: Session) -> float | None:
-    """Return simulated time ÷ processor time of the workers in this call; of the call before where there was nothing
-    to do.
+    """Return simulated time ÷ processor time of the workers in this call.
+
+    It is that of the call before where there was nothing to do.
     """
     if session.seconds > 0.0:
         return round(60.0 * plan.minutes * session.runs / session.seconds, 1)

@@ -223,8 +223,9 @@ _RIGHT_OR_FLAGGED = most("unflagged", 3.0)
 
 
 def _slipping(friction: float) -> Condition:
-    """Return the pilot moves a lever that friction holds in between: it is nothing that a model of the firmware
-    does.
+    """Return a condition in which the pilot moves a lever that friction holds in between.
+
+    It is nothing that a model of the firmware does.
     """
     title = f"friction of {friction:g} N m, through which the pilot moves the lever, 3° rms"
     also = ("unflagged", "silent")

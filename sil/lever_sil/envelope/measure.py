@@ -177,8 +177,9 @@ def _back(outcome: Outcome) -> Values:
 
 
 def _learnt(within: float, outcome: Outcome) -> Values:
-    """Return greatest change of a parameter in an event, `within` seconds after its begin, in its standard
-    deviations.
+    """Return the greatest change of a parameter in an event, in its standard deviations.
+
+    It is that `within` seconds after the begin of the event.
     """
     changes = [np.zeros(outcome.track.faults.shape[1])]
     for start, end in outcome.events:

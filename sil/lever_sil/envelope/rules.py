@@ -24,8 +24,9 @@ _OF_ARM = tuple(f"{name} {what}" for what in ("rms", "covered") for name in ("m_
 
 
 def _jump(name: str, title: str, motion: Motion, median: float, p90: float, worst: float) -> Condition:
-    """Return the arm changes at once, and the lever rests where it did. Limits are those of the time to 5 % of f_n
-    [s].
+    """Return a condition in which the arm changes at once, and the lever rests where it did.
+
+    Limits are those of the time to 5 % of f_n [s].
     """
     settled = (most("settled", value, over) for value, over in ((median, "median"), (p90, "p90"), (worst, "worst")))
     return Condition(
@@ -55,8 +56,10 @@ _JUMPS = (
 
 
 def _long(name: str, title: str, motion: Motion, limits: tuple[Limit, ...]) -> Condition:
-    """Return some hours in which no arm changes. The limits of re-trims and of steady flight are what was measured
-    on 2026-11-25 with 40 seeds, 78 and 3.4 changes an hour, 1.36 and 0.83 % of f_n, plus two standard errors.
+    """Return some hours in which no arm changes.
+
+    The limits of re-trims and of steady flight are what was measured on 2026-11-25 with 40 seeds, 78 and 3.4 changes an
+    hour, 1.36 and 0.83 % of f_n, plus two standard errors.
     """
     return Condition(name, title, motion, limits, also=("changes", *_SHARES), runs=2)
 

@@ -89,8 +89,10 @@ class Loop:
     def __init__(
         self, scenario: Scenario, inputs: Inputs, *, by_frames: bool, every: int, estimator: Estimator | None = None
     ) -> None:
-        """`every`: of how many samples one has its estimate kept. `estimator`: goes on from where it is, without the
-        reset that a run begins with.
+        """Prepare a run.
+
+        `every`: of how many samples one has its estimate kept. `estimator`: goes on from where it is, without the reset
+        that a run begins with.
         """
         if not plants.has(inputs.truth):
             raise LeverError(f"a pilot of model {inputs.truth.model} runs in Python only: use run.runner.simulate()")
@@ -168,8 +170,9 @@ class Loop:
             loop.command = self.struct.keep(_command_structs(values))
 
     def watch(self, aircraft: AircraftResponse | None) -> NDArray[Any]:
-        """Return the firmware watches the loop with this aircraft, where there is one; return what is kept of that:
-        lever_stability_t.
+        """Have the firmware watch the loop with this aircraft, where there is one.
+
+        Return what is kept of that: lever_stability_t.
         """
         self._estimator.watch(aircraft)
         kept = np.zeros(len(self._healths), struct_dtype("lever_stability_t"))

@@ -20,8 +20,9 @@ class Struct:
         self._kept: list[Any] = []
 
     def array(self, ctype: str, values: NDArray[Any], dtype: Any) -> Any:
-        """Return a pointer to the values, for a field of the struct: a copy of them only where they are not as C has
-        them.
+        """Return a pointer to the values, for a field of the struct.
+
+        It is to a copy of them only where they are not as C has them.
         """
         contiguous = np.ascontiguousarray(values, dtype)
         return self.keep(ffi.from_buffer(f"{ctype}[]", contiguous))

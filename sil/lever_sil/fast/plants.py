@@ -28,7 +28,10 @@ def has(truth: Truth) -> bool:
 
 
 def move(truth: Truth, conditions: Conditions, command: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """theta [rad], theta_dot [rad/s] and tau_m [N m] at every sample, from rest, with the torques `command` [N m]."""
+    """Return theta [rad], theta_dot [rad/s] and tau_m [N m] at every sample, from rest.
+
+    `command` are the torques [N m].
+    """
     struct, signals = Struct("plant_t"), np.empty((3, len(command)))
     fill(struct, struct.pointer, truth, conditions)
     pointers = [struct.doubles(signal) for signal in signals]
@@ -42,8 +45,9 @@ def outside(truth: Truth) -> float:
 
 
 def fill(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> None:
-    """Put a truth at rest, and what acts on it, into a plant_t in a struct. Where z_ddot comes to be known on the
-    way, it is what is felt().
+    """Put a truth at rest, and what acts on it, into a plant_t in a struct.
+
+    Where z_ddot comes to be known on the way, it is what is felt().
     """
     if isinstance(truth, linear_plant.LinearTruth) and conditions.ahead > 1:
         conditions = truth.felt(conditions)

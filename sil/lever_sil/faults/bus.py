@@ -306,8 +306,9 @@ def stale(message: str) -> Fault:
 
 
 def foreign_load() -> Fault:
-    """Return frames of other identifiers, among them those that the firmware itself sends, as many as the bus can
-    carry.
+    """Send frames of other identifiers, as many as the bus can carry.
+
+    Among them are those that the firmware itself sends.
     """
 
     def spoil(bus: Bus, time: Interval) -> None:

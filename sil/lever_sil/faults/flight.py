@@ -75,8 +75,9 @@ class Pilot:
         grip: bool = False,
         frozen: bool = False,
     ) -> Record:
-        """Return a flight with faults in a time [s]; `grip`: there is a sensor of the grip force; `frozen`: the
-        parameters are held from FREEZE on.
+        """Return a flight with faults in a time [s].
+
+        `grip`: there is a sensor of the grip force; `frozen`: the parameters are held from FREEZE on.
         """
         sent, read = self._right(grip)
         if frozen:

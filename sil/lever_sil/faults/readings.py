@@ -123,9 +123,7 @@ def spikes(signal: str) -> Fault:
 
 
 def clock(change: Callable[[NDArray[np.float64]], NDArray[np.float64]]) -> Fault:
-    """Change the sender's time: from the time since the fault began [s] to what the sender says of
-    it.
-    """
+    """Change the sender's time: from the time since the fault began [s] to what the sender says of it."""
 
     def spoil(readings: Readings, during: Indices) -> None:
         start = readings.time_us[during[0]]

@@ -343,8 +343,10 @@ def _frozen(row: Row) -> Row:
 
 
 def _from_power_on(row: Row) -> Row:
-    """Return the same fault from the first sample on, in ALIGN already. What is stuck shows half a second after
-    ALIGN at the latest; what only the innovations show, any way, two seconds after the first that may be judged.
+    """Return the same fault from the first sample on, in ALIGN already.
+
+    What is stuck shows half a second after ALIGN at the latest; what only the innovations show, any way, two seconds
+    after the first that may be judged.
     """
     requirement, wrong = row.requirement, row.requirement.within == _WRONG
     later = _JUDGED if wrong else _ALIGNED if row.requirement.within == _STUCK else 0
@@ -366,8 +368,9 @@ def _failing() -> Iterator[Row]:
 
 
 def _coasting() -> Iterator[Row]:
-    """Yield faults of the base acceleration while no lever signal comes, for its own stillness is all that shows
-    them. Torque has ended, and cannot be compared.
+    """Yield faults of the base acceleration while no lever signal comes, for its own stillness is all that shows them.
+
+    Torque has ended, and cannot be compared.
     """
     requirement = replace(_BLIND, flags=("BASE",), within=_STUCK)
     faults = {"stuck": ("stuck", readings.stuck("z_ddot")), "zero": ("zero", readings.reads("z_ddot", 0.0))}

@@ -93,8 +93,10 @@ def rows(results: Sequence[RowResult]) -> list[dict[str, Any]]:
 
 
 def counts(results: Sequence[RowResult]) -> dict[str, int]:
-    """Return how many rows there are, how many miss what they must, how many of these are not known to, and in how
-    many the firmware was silently wrong.
+    """Return how many rows there are, and how many are not as they must be.
+
+    They are those that miss what they must, those of these that are not known to, and those in which the firmware was
+    silently wrong.
     """
     return {
         "count": len(results),

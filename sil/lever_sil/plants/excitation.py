@@ -89,8 +89,10 @@ class Band(Normalised):
 
 @dataclass(frozen=True, kw_only=True)
 class Multisine(Band):
-    """`lines` equally strong, equally spaced sines from `low` to `high`, with Schroeder's phases
-    phi_n = -pi n (n - 1) / lines (IEEE Trans. Inf. Theory 16, 1970), which keep the crest factor near that of one sine.
+    """`lines` equally strong, equally spaced sines from `low` to `high`.
+
+    They have Schroeder's phases phi_n = -pi n (n - 1) / lines (IEEE Trans. Inf. Theory 16, 1970), which keep the crest
+    factor near that of one sine.
     """
 
     lines: int = whole(10, least=2, greatest=1000)

@@ -71,8 +71,9 @@ class Lever:
 
 @dataclass(frozen=True)
 class Truth:
-    """The pilot at every sample: arrays of equal length [kg, N s/m, N/m, rad]; 0, 0, 0 while the hands are
-    off the lever. Fixed preload does not use the trim.
+    """The pilot at every sample: arrays of equal length [kg, N s/m, N/m, rad].
+
+    They are 0, 0, 0 while the hands are off the lever. Fixed preload does not use the trim.
     """
 
     m_p: FloatArray
@@ -87,13 +88,14 @@ def inertia(lever: Lever, truth: Truth) -> FloatArray:
 
 
 def moment(lever: Lever, truth: Truth) -> FloatArray:
-    """l mu: torque by vertical acceleration at theta = 0 [kg m]."""
+    """Return l mu: the torque by vertical acceleration at theta = 0 [kg m]."""
     return lever.lever_length * (lever.lever_mass_position * lever.lever_mass + truth.m_p)
 
 
 def preload(lever: Lever, truth: Truth, kind: Preload) -> tuple[FloatArray, FloatArray]:
-    """Return (torque by which arm's preload and weight turn the lever, per cosine [N m]; theta_l): l^2 k_p sin
-    theta_a - g l mu.
+    """Return the torque by which arm's preload and weight turn the lever, per cosine [N m], and theta_l.
+
+    That torque is l^2 k_p sin theta_a - g l mu.
     """
     arm = lever.lever_length**2 * truth.k_p
     if kind == "trim":
@@ -123,8 +125,9 @@ def damping(lever: Lever, truth: Truth, angle: FloatArray) -> FloatArray:
 
 
 def equilibrium(lever: Lever, truth: Truth, kind: Preload) -> FloatArray:
-    """Return the angle at which the lever rests [rad]: the trim, or with fixed preload where springs and weight
-    balance.
+    """Return the angle at which the lever rests [rad].
+
+    It is the trim, or with fixed preload where springs and weight balance.
     """
     if kind == "trim":
         return truth.trim
@@ -138,7 +141,7 @@ def equilibrium(lever: Lever, truth: Truth, kind: Preload) -> FloatArray:
 
 
 def dynamics(lever: Lever, truth: Truth, kind: Preload) -> Dynamics:
-    """omega = sqrt(K / M) / 2 pi [Hz] and zeta = D / (2 sqrt(K M)) [1] at the equilibrium."""
+    """Return omega = sqrt(K / M) / 2 pi [Hz] and zeta = D / (2 sqrt(K M)) [1] at the equilibrium."""
     angle = equilibrium(lever, truth, kind)
     mass, spring = inertia(lever, truth), stiffness(lever, truth, kind, angle)
     damper = damping(lever, truth, angle)
@@ -158,7 +161,7 @@ def resistance(lever: Lever, rate: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class LeverTruth(truths.Truth):
-    """This lever with its pilot, as a run needs them."""
+    """A lever of this model with its pilot, as a run needs them."""
 
     model = "lever"
     has_grip_force = True
@@ -239,8 +242,9 @@ class LeverPlant:
         self._rows = _rows(coefficients(lever, truth, kind), conditions)
 
     def advance(self, command: float, reflex: float = 0.0) -> None:
-        """To the next sample, with the torque `command` and one of the arm [N m] held. Raise StopIteration after the
-        last sample.
+        """Go to the next sample, with the torque `command` and one of the arm [N m] held.
+
+        Raise StopIteration after the last sample.
         """
         theta, theta_dot, torque = self.theta, self.theta_dot, self.tau_m - command
         mass, moment, arm_damping, arm_stiffness, hold, lever_angle, drive = next(self._rows)
@@ -274,8 +278,9 @@ class LeverPlant:
     def _force_on_lever(
         self, begin: float, begin_dot: float, drive: list[list[float]], lever_angle: float, motor: float
     ) -> float:
-        """Return mean force of the hand [N] since the lever was at `begin` with the rate `begin_dot`, to second
-        order in the period.
+        """Return the mean force of the hand [N] since the lever was at `begin` with the rate `begin_dot`.
+
+        It is right to second order in the period.
         """
         lever, period = self._lever, self._step * len(drive)
         middle = 0.5 * (begin + self.theta)

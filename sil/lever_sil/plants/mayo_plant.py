@@ -45,7 +45,7 @@ class Hand:
 
     @property
     def outside(self) -> float:
-        """a - b: what damps the hand's motion in space, not that in the cabin [1/s]."""
+        """Return a - b: what damps the hand's motion in space, not that in the cabin [1/s]."""
         return self.damping - self.lead
 
 

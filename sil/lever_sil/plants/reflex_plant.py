@@ -115,8 +115,9 @@ class ReflexPlant(lever_plant.LeverPlant):
         self._forces: list[float] = []
 
     def advance(self, command: float, reflex: float = 0.0) -> None:
-        """To the next sample, with the torques `command` and `reflex` [N m], beside its own, held. Raise StopIteration
-        after the last sample.
+        """Go to the next sample, with the torques `command` and `reflex` [N m], beside its own, held.
+
+        Raise StopIteration after the last sample.
         """
         length = self._lever.lever_length
         k_r, c_r, rest_sine = self._grip[len(self._forces)].tolist()

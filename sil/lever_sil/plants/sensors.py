@@ -155,8 +155,9 @@ class Dropout:
 
 @dataclass(frozen=True)
 class Sensors:
-    """All sensors; the defaults are the standard values: 1 mrad and 10 mrad/s of noise, a fair accelerometer and torque
-    sensor; no sensor of the grip force.
+    """All sensors; the defaults are the standard values.
+
+    These are 1 mrad and 10 mrad/s of noise, a fair accelerometer and torque sensor; no sensor of the grip force.
     """
 
     theta: Sensor = item(read_table(Sensor), "rad", Sensor(noise=1e-3))

@@ -145,8 +145,9 @@ class Truth(ABC):
     @property
     @abstractmethod
     def dynamics(self) -> Dynamics:
-        """Natural frequency and damping ratio; of the mode that an observer of theta sees, where there are several. NaN
-        while the hands are off the lever.
+        """Return natural frequency and damping ratio; NaN while the hands are off the lever.
+
+        They are those of the mode that an observer of theta sees, where there are several.
         """
 
     @abstractmethod
@@ -176,8 +177,9 @@ def _part(value: Any, samples: slice) -> Any:
 
 
 def dominant_dynamics(truth: Truth, *columns: FloatArray) -> Dynamics:
-    """Return those of the dominant mode of its transfer function, worked out only where one of its `columns` has
-    changed: eigenvalues take long.
+    """Return the dynamics of the dominant mode of its transfer function.
+
+    They are worked out only where one of its `columns` has changed: eigenvalues take long.
     """
     new = np.append(True, np.any(np.diff(np.stack(columns), axis=1) != 0.0, axis=0))
     frequency, ratio = truth.transfer(np.flatnonzero(new)).dominant_mode()

@@ -37,8 +37,9 @@ class Frames:
 
 
 def lines(frames: Frames, channel: str) -> Iterator[bytes]:
-    """Yield the log in pieces; lines whose seconds have the same number of digits have the same length and go
-    together.
+    """Yield the log in pieces.
+
+    Lines whose seconds have the same number of digits have the same length and go together.
     """
     seconds = frames.time_us // 1_000_000
     digits = np.char.str_len(seconds.astype(np.str_)) if len(frames) else np.zeros(0, dtype=np.int64)

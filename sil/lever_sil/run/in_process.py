@@ -22,8 +22,9 @@ from .loop import Progress, Recording
 def run(
     scenario: Scenario, channel: str = "lever", progress: Progress | None = None, snapshots: float | None = None
 ) -> Recording:
-    """Run `scenario`; `channel` names the estimator in errors, which sends its state each `snapshots` seconds. A pilot
-    whose plant the C does not have runs in Python.
+    """Run `scenario`; a pilot whose plant the C does not have runs in Python.
+
+    `channel` names the estimator in errors, which sends its state each `snapshots` seconds.
 
     Raise NoAnswerError when the firmware falls silent, RefusedError when it refuses a COMMAND.
     """

@@ -136,8 +136,9 @@ def run(
     progress: Progress | None = None,
     commander: Commander | None = None,
 ) -> Recording:
-    """Run `scenario` against the estimator on `bus`, as fast as that answers or paced by the wall clock. One that comes
-    from another run rests for REST first, off the record, so that one seed is one run on it, too.
+    """Run `scenario` against the estimator on `bus`, as fast as that answers or paced by the wall clock.
+
+    One that comes from another run rests for REST first, off the record, so that one seed is one run on it, too.
 
     `commander`: of whoever else sends COMMAND on this bus. Raise NoAnswerError when nobody answers, RefusedError when
     the estimator refuses a COMMAND, and LeverError when it speaks another contract or has other settings.
@@ -156,8 +157,9 @@ def run(
 
 
 def _rest(link: _Link, scenario: Scenario, theta: float) -> None:
-    """Send samples of a lever at rest until the estimator, after a reset, is like a fresh one: up to a HEALTH, which
-    clears the faults that it has latched.
+    """Send samples of a lever at rest until the estimator, after a reset, is like a fresh one.
+
+    That is up to a HEALTH, which clears the faults that it has latched.
     """
     send_lever, send_base = link.sender("LEVER_SAMPLE"), link.sender("BASE_SAMPLE")
     encode_lever, encode_base = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
@@ -213,8 +215,10 @@ class _Link:
         return send_frame
 
     def command(self, sample: int, values: Mapping[str, codec.Value]) -> None:
-        """Send a COMMAND and wait until it is acknowledged. A run that has just ended may have left the sequence
-        counter anywhere, so the first COMMAND is repeated until it is in sequence. Raise LeverError.
+        """Send a COMMAND and wait until it is acknowledged; raise LeverError.
+
+        A run that has just ended may have left the sequence counter anywhere, so the first COMMAND is repeated until it
+        is in sequence.
         """
         send = self.sender("COMMAND")
         for _ in range(1 if sample else 16):
@@ -242,8 +246,9 @@ class _Link:
         return None
 
     def answer(self, sample: int) -> tuple[float, float]:
-        """Take what the estimator sends for this sample, up to its STATE_ESTIMATE; return the torque that it asks
-        for and what it adds to the lever's angle.
+        """Take what the estimator sends for this sample, up to its STATE_ESTIMATE.
+
+        Return the torque that it asks for and what it adds to the lever's angle.
         """
         time_low = sample * self._period_us & 0xFFFF
         timeout = ANSWER_TIMEOUT if sample else FIRST_TIMEOUT
@@ -287,8 +292,9 @@ class _Link:
         return None
 
     def _check_settings(self) -> None:
-        """Check that the settings of the bus are the scenario's: no frame carries them. Raise SettingsError when
-        they are not.
+        """Check that the settings of the bus are the scenario's: no frame carries them.
+
+        Raise SettingsError when they are not.
         """
         scenario, says = self._tape.scenario, self._tape.identity.settings_crc
         if says not in (None, scenario.config.settings_crc):
@@ -364,8 +370,9 @@ def _loop(tape: _Tape, link: _Link, realtime: bool, progress: Progress | None) -
 
 
 def _advance(body: Body, cabin: Flight | None, inputs: Inputs) -> Callable[[int, float, float], None]:
-    """Return a function that takes lever and cabin from a sample to the next, with the torque [N m] held and what is
-    added to the lever's angle [rad].
+    """Return a function that takes lever and cabin from a sample to the next.
+
+    It does so with the torque [N m] held and what is added to the lever's angle [rad].
     """
     rest = body.theta
 

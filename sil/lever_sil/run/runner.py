@@ -57,8 +57,9 @@ def simulate(
     story: Callable[[], Story] | None = None,
     snapshots: float | None = None,
 ) -> SimulationResult:
-    """Run `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judge it;
-    with `out_dir` also write bus.log, the signals in `formats` (formats.FORMATS), report.html (with the extra `report`)
+    """Run `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judge it.
+
+    With `out_dir` also write bus.log, the signals in `formats` (formats.FORMATS), report.html (with the extra `report`)
     and summary.json there, all or none. `channel` is the bus's name in bus.log; `inputs` are files that the scenario is
     from; `story` makes a first picture for the report; in this process the firmware sends its state each `snapshots`
     seconds.

@@ -76,8 +76,9 @@ def rms(summaries: Sequence[SimulationSummary], key: str) -> FloatArray:
 
 
 def coverage(summaries: Sequence[SimulationSummary], key: str) -> FloatArray:
-    """Return share of the time of each run at which +-2 sigma holds the truth [%]; 0 where there is nothing to
-    judge.
+    """Return the share of the time of each run at which +-2 sigma holds the truth [%].
+
+    It is 0 where there is nothing to judge.
     """
     values = [summary.parameters[key].coverage_2sigma for summary in summaries]
     return 100.0 * np.array([value or 0.0 for value in values])
@@ -100,8 +101,9 @@ def flagged(summaries: Sequence[SimulationSummary]) -> FloatArray:
 
 
 def missed(summaries: Sequence[SimulationSummary]) -> list[str]:
-    """Return the limits that are not kept by the median of the rms errors, and by the coverage over all runs; in
-    words.
+    """Return the limits that are not kept, in words.
+
+    They are limits of the median of the rms errors, and of the coverage over all runs.
     """
     keys = judged(summaries)
     return missed_limits(

@@ -192,8 +192,9 @@ def _modes(trace: Trace) -> dict[str, float]:
 
 
 def _faults(scenario: Scenario, trace: Trace) -> tuple[dict[str, float], float | None]:
-    """Return shares (0 to 1) of the judged time with each fault that there was, and any of DO_NOT_TRUST (None:
-    unknown).
+    """Return shares (0 to 1) of the judged time with each fault that there was, and with any of DO_NOT_TRUST.
+
+    None: unknown.
     """
     column = trace["faults"][judged_samples(scenario, trace["time_s"])]
     counts = FaultCounts()

@@ -95,8 +95,9 @@ def conditions(scenario: Scenario, inputs: Inputs) -> Conditions:
 
 
 def flight(scenario: Scenario, inputs: Inputs) -> Flight | None:
-    """Return the helicopter around the lever, where there is one; the first acceleration of the cabin is in `inputs`
-    then.
+    """Return the helicopter around the lever, where there is one.
+
+    The first acceleration of the cabin is in `inputs` then.
     """
     if scenario.aircraft is None:
         return None
@@ -117,8 +118,10 @@ def readings(scenario: Scenario, inputs: Inputs, name: str) -> Readings:
 
 
 def commands(scenario: Scenario, time: FloatArray) -> dict[int, Mapping[str, Value]]:
-    """Return what to send at the samples before which a COMMAND goes out: a reset with the scenario's choices at the
-    start, the dither as it changes, and while it or a mitigation is on, one that keeps them alive.
+    """Return what to send at the samples before which a COMMAND goes out.
+
+    That is a reset with the scenario's choices at the start, the dither as it changes, and while it or a mitigation is
+    on, one that keeps them alive.
     """
     changes = {int(np.searchsorted(time, when - 1e-9)): rms for when, rms in scenario.dithers()}
     sent: dict[int, Mapping[str, Value]] = {0: {"request": "reset", "dither_rms": 0.0, **scenario.config.choices}}

@@ -210,8 +210,9 @@ class Scenario:
             raise ScenarioError(f"{self.file}: pilot.{error}") from None
 
     def judged(self) -> tuple[quantities.Quantity, ...]:
-        """Return what there is a truth of: everything, or no parameters when the pilot is not of the estimator's
-        model.
+        """Return what there is a truth of.
+
+        It is everything, or no parameters when the pilot is not of the estimator's model.
         """
         model = self.config.choices["model"]
         return quantities.quantities(model) if self.pilot.model == model else quantities.DYNAMICS
@@ -236,8 +237,9 @@ class Scenario:
                 raise ScenarioError(f"{self.file}: limits.{name}: this run has no true value of it")
 
     def changes(self) -> tuple[float, ...]:
-        """Return times [s] after which the parameters have to be found anew: the start, and every jump of one of
-        them.
+        """Return times [s] after which the parameters have to be found anew.
+
+        They are the start, and every jump of one of them.
         """
         return (0.0, *sorted(time for time in self.pilot.changes() if 0.0 < time < self.duration))
 
@@ -256,10 +258,9 @@ names = SHELF.names
 
 
 def load(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scenario:
-    """Return the scenario of that name, or in the file of that path (ending in .toml), with "key.subkey=value"
-    overrides.
+    """Return the scenario of that name, or in the file of that path (ending in .toml); raise ScenarioError.
 
-    Raises ScenarioError.
+    `overrides` are "key.subkey=value".
     """
     if not isinstance(name_or_path, (str, os.PathLike)):
         raise ScenarioError(f"{name_or_path!r} is no scenario: give its name, or the path of a .toml file")

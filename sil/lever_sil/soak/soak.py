@@ -118,7 +118,7 @@ class SoakResult:
 
     @property
     def growth(self) -> float:
-        """[MiB]"""
+        """Return by how much the memory has grown since it had settled [MiB]."""
         return self.parts[-1].memory - self.settled_memory
 
     def troubles(self) -> list[str]:
@@ -205,7 +205,7 @@ def _errors(values: dict[str, FloatArray], estimates: NDArray[Any]) -> Iterator[
 
 
 def _nees(values: dict[str, FloatArray], estimates: NDArray[Any]) -> FloatArray:
-    """e' P^-1 e / 3 on the logarithmic scale of the filter; expected 1."""
+    """Return e' P^-1 e / 3 on the logarithmic scale of the filter; expected 1."""
     estimate = estimates["parameter"].astype(np.float64)
     with np.errstate(all="ignore"):
         error = np.log(estimate / np.stack([values[name] for name in PARAMETERS], axis=-1))

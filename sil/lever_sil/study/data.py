@@ -31,8 +31,9 @@ class Model(Protocol):
         """Return states (2, …) dt [s] later, of parameters (3, …) in physical units."""
 
     def dynamics(self, p: Array, trim: float | Array) -> Array:
-        """Return natural frequency [Hz] and damping ratio [1], (2, …), of parameters (3, …) about the angle `trim`
-        [rad].
+        """Return natural frequency [Hz] and damping ratio [1], (2, …), of parameters (3, …).
+
+        They are those about the angle `trim` [rad].
         """
 
 
@@ -54,12 +55,12 @@ class Knowledge:
     """Random walk of theta_dot: torque that is not modelled [rad/s/√s]."""
 
     def physical(self, w: Array) -> Array:
-        """p in physical units of w, both (…, 3)."""
+        """Return p in physical units of w, both (…, 3)."""
         p: Array = self.guess * np.exp(w) if self.positive else self.guess + self.sigma * w
         return p
 
     def scaled(self, p: Array) -> Array:
-        """w of p in physical units, both (…, 3)."""
+        """Return w of p in physical units, both (…, 3)."""
         w: Array = np.log(p / self.guess) if self.positive else (p - self.guess) / self.sigma
         return w
 

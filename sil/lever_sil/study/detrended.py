@@ -18,8 +18,9 @@ from .data import OUTPUTS, Batch
 
 
 def detrended(batch: Batch, corner: float, align_time: float) -> Batch:
-    """Return the batch with y, u and trim made of raw_y and raw_u; corner [Hz], theta at first a mean of align_time
-    [s].
+    """Return the batch with y, u and trim made of raw_y and raw_u.
+
+    `corner` is in Hz; theta is at first a mean of align_time [s].
     """
     signals = np.concatenate((batch.raw_y, batch.raw_u), axis=2)
     start = np.zeros((batch.runs, signals.shape[2]))

@@ -25,8 +25,9 @@ def streams(seed: int, runs: int) -> list[dict[str, np.random.Generator]]:
 def excitation(
     rms: tuple[float, float], band: tuple[float, float], time: Array, own: dict[str, np.random.Generator]
 ) -> Array:
-    """Return (K, 2) z_ddot [m/s²] and tau_m [N m] of one run at the times (K,) [s]: noise of `rms` in the `band`
-    [Hz].
+    """Return (K, 2) z_ddot [m/s²] and tau_m [N m] of one run at the times (K,) [s].
+
+    They are noise of `rms` in the `band` [Hz].
     """
     low, high = band
     sources = zip(rms, (own["base"], own["dither"]), strict=True)

@@ -91,8 +91,9 @@ def knowledge(settings: Mapping[str, float], kind: Kind) -> Knowledge:
 
 
 def matched(condition: Condition, runs: int, duration: float, seed: int) -> Batch:
-    """Return `runs` runs of `duration` [s]. The same seed gives the same batch, to the bit, and run i whatever `runs`
-    is.
+    """Return `runs` runs of `duration` [s].
+
+    The same seed gives the same batch, to the bit, and run i whatever `runs` is.
 
     Raise ValueError for a model or preload that does not exist, and for settings by which hardly any draw of the
     parameters stays in the bounds.
@@ -148,8 +149,9 @@ def jump(samples: int, moment: int, factors: Array) -> Array:
 
 
 def _bounds(kind: Kind) -> Array:
-    """Return (3, 2) least and greatest parameters of the model, which are those that settings take for the first
-    guess.
+    """Return (3, 2) least and greatest parameters of the model.
+
+    They are those that settings take for the first guess.
     """
     return np.array([(setting(name).least, setting(name).greatest) for name in kind.parameters])
 

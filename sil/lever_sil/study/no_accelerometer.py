@@ -114,8 +114,9 @@ def likeliest(y: Array, truth: Array, spectrum: Spectrum, start: tuple[float, ..
 
 
 def _periodogram(y: Array, noise: Array, period: float) -> tuple[Array, Array, Array]:
-    """Return frequencies [Hz]; the periodogram of theta from both outputs, weighted by their noise; its noise
-    (one-sided).
+    """Return frequencies [Hz]; the periodogram of theta from both outputs; its noise (one-sided).
+
+    The outputs are weighted by their noise.
     """
     frequency = np.fft.rfftfreq(len(y), period)
     inside = (frequency >= _BAND[0]) & (frequency <= _BAND[1])

@@ -38,8 +38,9 @@ def errors(batch: Batch, estimates: Estimates) -> Array:
 
 
 def ratio(deviations: Array, variances: Array) -> Array:
-    """Return (n,) rms of errors (B, T, n) ÷ root of the mean of variances (B, T, n) or (T, n) (linearised.py,
-    bound.py).
+    """Return (n,) rms of errors (B, T, n) ÷ root of the mean of variances (B, T, n) or (T, n).
+
+    The variances are of linearised.py or bound.py.
 
     With the squares of another estimator's errors for `variances`: how the two compare. On the same data that ratio has
     the smaller spread, as most of what chance does, it does to both.
@@ -75,8 +76,9 @@ def ratio_spread(deviations: Array, variances: Array, seed: int, draws: int = 20
 
 
 def sigma_ratio(deviations: Array, variances: Array) -> Array:
-    """Return (n,) what an estimator claims ÷ what it does: root of the mean of its variances (B, T, n) ÷ rms of its
-    errors.
+    """Return (n,) what an estimator claims ÷ what it does.
+
+    It is the root of the mean of its variances (B, T, n) ÷ rms of its errors.
     """
     return 1.0 / ratio(deviations, variances)
 

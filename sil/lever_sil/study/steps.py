@@ -1,4 +1,4 @@
-"""Runs in which the pilot suddenly tightens or slackens the grip: how fast is that followed, and what does it cost?
+"""Runs in which the pilot suddenly tightens or slackens the grip: how fast that is followed, and what it costs.
 
 The truth is the nonlinear lever, in continuous time but for short substeps; parameters are constant but for one step of
 c_p and k_p. Base and motor shake it, both measured without error; theta and theta_dot are measured with white noise.

@@ -67,8 +67,9 @@ def process_covariance(batch: Batch) -> Array:
 
 
 def measured(p: Array, noise: Array) -> Array:
-    """Return covariances (B, 5, 5) after a sample of both states with the covariance `noise` (2, 2), of those before
-    it.
+    """Return covariances (B, 5, 5) after a sample of both states, of those before it.
+
+    The sample has the covariance `noise` (2, 2).
     """
     gain = p[:, :, PARAMETERS:] @ np.linalg.inv(p[:, PARAMETERS:, PARAMETERS:] + noise)
     remains = np.tile(np.eye(SIZE), (len(p), 1, 1))
@@ -78,8 +79,9 @@ def measured(p: Array, noise: Array) -> Array:
 
 
 def dynamics_gradient(batch: Batch, at: NDArray[np.int64], w: Array) -> Array:
-    """Return (B, T, 2, 3) of the logarithms of natural frequency and damping ratio by w (B, T, 3), at the samples
-    `at`.
+    """Return (B, T, 2, 3) of the logarithms of natural frequency and damping ratio by w (B, T, 3).
+
+    They are those at the samples `at`.
     """
     angle = batch.rest(at)
 

@@ -33,10 +33,10 @@ class Coefficients(Protocol):
     """What q has to do with the parameters p; arrays (…, 3)."""
 
     def of_parameters(self, p: Array) -> Array:
-        """q of p."""
+        """Return q of p."""
 
     def parameters(self, q: Array) -> Array:
-        """p of q."""
+        """Return p of q."""
 
     def slope(self, q: Array) -> Array:
         """dp/dq, (…, 3, 3)."""

@@ -30,8 +30,9 @@ def followed(
     steps: int = 1,
     centre: Mapping[str, float] | None = None,
 ) -> Estimates:
-    """recursion.follow() of a FILTER_ of c/filters.h, or of the class that it stands for, which `reference` makes. With
-    `centre`: reach and weights of sigma points.
+    """Estimate as recursion.follow() does, by a FILTER_ of c/filters.h, or by the class that it stands for.
+
+    That class is what `reference` makes. With `centre`: reach and weights of sigma points.
     """
     if type(batch.model) not in _MODELS or batch.missing is not None:
         return follow(reference(batch), at)

@@ -35,7 +35,7 @@ class UnscentedTransform:
 
     @property
     def reach(self) -> float:
-        """n + lambda: squared distance of a point, in standard deviations."""
+        """Return n + lambda: the squared distance of a point, in standard deviations."""
         return self.alpha**2 * (_SIZE + self.kappa)
 
     @property

@@ -27,7 +27,7 @@ class Recursion(Protocol):
 
     @property
     def w_covariance(self) -> Array:
-        """(B, 3, 3)"""
+        """Return the covariance of w, (B, 3, 3)."""
 
     def step(self, k: int) -> None:
         """From sample k - 1 to sample k."""
@@ -98,8 +98,9 @@ class Slopes:
         self._x, self._w = offsets[:, :STATES], offsets[:, STATES:]
 
     def move(self, k: int, x: Array, w: Array) -> tuple[Array, Array, Array]:
-        """Return states (B, 2) at sample k + 1 of x (B, 2) at sample k with w (B, 3); dx⁺/dx (B, 2, 2), dx⁺/dw (B,
-        2, 3).
+        """Return states (B, 2) at sample k + 1 of x (B, 2) at sample k with w (B, 3), and their derivatives.
+
+        These are dx⁺/dx (B, 2, 2), dx⁺/dw (B, 2, 3).
         """
         moved = self._batch.move(k, x[:, np.newaxis] + self._x, w[:, np.newaxis] + self._w)
         half = STATES + PARAMETERS + 1

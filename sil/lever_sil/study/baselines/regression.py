@@ -40,14 +40,15 @@ class Equations:
     coefficients: Coefficients
 
     def first_guess(self, knowledge: Knowledge) -> tuple[Array, Array]:
-        """q (3,) before the first equation, and what is known of it as a covariance (3, 3), to first order."""
+        """Return q (3,) before the first equation, and what is known of it as a covariance (3, 3), to first order."""
         q = self.coefficients.of_parameters(knowledge.guess)
         to_q = np.linalg.inv(self._slope(q, knowledge))
         return q, to_q @ np.diag(knowledge.sigma_w**2) @ to_q.T
 
     def estimates(self, at: NDArray[np.int64], knowledge: Knowledge, q: Array, covariance: Array | None) -> Estimates:
-        """Return what q (B, J + 1, 3) and its covariance (B, J + 1, 3, 3), from before the first equation on, say at
-        `at`.
+        """Return what q (B, J + 1, 3) and its covariance (B, J + 1, 3, 3) say at `at`.
+
+        Both are from before the first equation on.
 
         Where q means no parameters (a negative mass) the last one that did stands; where it is not finite, NaN.
         """
@@ -108,8 +109,9 @@ def _high_pass(values: Array, corner: float, dt: float) -> Array:
 
 
 def _variance(batch: Batch, n: int) -> float:
-    """Return the variance of the difference of neighbouring means of n samples of theta_dot, by n dt: of white noise
-    and a random walk.
+    """Return the variance of the difference of neighbouring means of n samples of theta_dot, by n dt.
+
+    It is that of white noise and a random walk.
     """
     white = 2.0 * float(batch.knowledge.output_noise[1]) ** 2 / n
     walk = batch.knowledge.process_noise**2 * batch.period * (2 * n**2 + 1) / (3 * n)

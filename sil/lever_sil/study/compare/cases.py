@@ -106,7 +106,7 @@ class Case(ABC):
         return plan.seeds
 
     def length(self, plan: Plan) -> float:
-        """[s]"""
+        """Return how long a run is [s]."""
         return self.duration if plan.duration is None else plan.duration
 
     def scaled(self, moment: float, plan: Plan) -> float:
@@ -199,9 +199,10 @@ class Stepped(Case):
 
 @dataclass(frozen=True, kw_only=True)
 class Paper(Case):
-    """The experiment of the paper (../PAPER.md): parameters that stay, drift or jump, under two levels of noise in each
-    channel. Whatever they do, estimators are told the same walk. Errors are judged from 10 s on, and after a jump of
-    damping and stiffness in the middle from 5 s after it on.
+    """The experiment of the paper (../PAPER.md): parameters that stay, drift or jump.
+
+    They do so under two levels of noise in each channel. Whatever they do, estimators are told the same walk. Errors
+    are judged from 10 s on, and after a jump of damping and stiffness in the middle from 5 s after it on.
     """
 
     kind: str = "paper"
@@ -253,9 +254,10 @@ class Paper(Case):
 
 @dataclass(frozen=True, kw_only=True)
 class Protocol(Paper):
-    """What others have tried time-varying estimators on (../PAPER.md), on the lever: `truth` is "constant", "jump",
-    "slow" (damping and stiffness rise as in the jump, within half of the run) or "square wave" (stiffness alone, 5 s
-    high and 5 s low from 10 s on). The remnant is process noise.
+    """What others have tried time-varying estimators on (../PAPER.md), on the lever.
+
+    `truth` is "constant", "jump", "slow" (damping and stiffness rise as in the jump, within half of the run) or "square
+    wave" (stiffness alone, 5 s high and 5 s low from 10 s on). The remnant is process noise.
     """
 
     kind: str = "protocol"

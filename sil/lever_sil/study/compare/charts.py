@@ -133,8 +133,9 @@ def _vertical(at: float, colour: str = "mark") -> Spec:
 
 
 def settling(results: Results, case: str) -> Figure | None:
-    """Return the settling of each run, when the natural frequency was found for good; hollow at the right end:
-    never.
+    """Return the settling of each run, when the natural frequency was found for good.
+
+    It is hollow at the right end: never.
     """
     change, names = cases()[case].change(results.plan), _present(results, case)
     if change is None or not names:
@@ -154,8 +155,9 @@ def settling(results: Results, case: str) -> Figure | None:
 
 
 def following(results: Results, case: str) -> Figure | None:
-    """Return the error of the natural frequency about the step: median over runs, and of the first of ours the
-    middle half.
+    """Return the error of the natural frequency about the step.
+
+    It is the median over runs, and of the first of ours the middle half.
     """
     change, names = cases()[case].change(results.plan), _present(results, case)
     if change is None or not names:
@@ -185,7 +187,7 @@ def _is_ours(case: str, name: str) -> bool:
 
 
 def wrong_noise(rows: Sequence[Row], case: str) -> Figure | None:
-    """rms error ÷ that of the tuned filter for each wrong noise, a symbol for each quantity."""
+    """Return the rms error ÷ that of the tuned filter for each wrong noise, a symbol for each quantity."""
     chosen = [row for row in rows if row.case == case and math.isfinite(row.against[FREQUENCY])]
     if not chosen:
         return None

@@ -61,8 +61,9 @@ Differences = dict[tuple[str, str], Difference]
 def differences(
     case: str, names: Sequence[str], statistic: Any, runs: int, reference: str | None = None
 ) -> Differences:
-    """Return the differences of each of `names` against the `reference`, or against the best; `statistic` (rows, axis)
-    gives their logarithms.
+    """Return the differences of each of `names` against the `reference`, or against the best.
+
+    `statistic` (rows, axis) gives their logarithms.
 
     `rows` holds indices of drawn runs along `axis` (-1); the names come first in what is returned. None below
     LEAST_RUNS.
@@ -93,8 +94,9 @@ def _difference(more: float, error: float, runs: int, counted: float) -> Differe
 
 
 def of_errors(case: str, squares: Mapping[str, Array], reference: str | None = None) -> Differences:
-    """Return the of errors of the geometric mean over quantities of rms errors; mean squares (B, n) of each run by
-    name of estimator.
+    """Return the differences of the geometric mean over quantities of rms errors.
+
+    `squares` are mean squares (B, n) of each run by name of estimator.
     """
     together = np.stack(list(squares.values()), axis=1)
 

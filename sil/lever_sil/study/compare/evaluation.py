@@ -204,8 +204,9 @@ def compare(results: Results, rows: list[Row]) -> tuple[Differences, Differences
 
 
 def _times(results: Results, case: str, names: list[str], change: float) -> Mapping[str, Array]:
-    """Return (B,) settling times [s]; never counts as the time that was left, at once as the time between two
-    estimates.
+    """Return (B,) settling times [s].
+
+    Never counts as the time that was left, at once as the time between two estimates.
     """
     by_name = {}
     for name in names:

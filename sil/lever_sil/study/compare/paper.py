@@ -41,8 +41,9 @@ def names() -> list[str]:
 
 
 def tables(results: Results) -> dict[str, list[Row]]:
-    """Return a table for each model, a row for each truth and estimator; a cell is median / worst of runs and levels of
-    noise.
+    """Return a table for each model, a row for each truth and estimator.
+
+    A cell is median / worst of runs and levels of noise.
     """
     by_title: dict[str, list[Row]] = {}
     for (model, truth, estimator), figures in _gathered(results).items():

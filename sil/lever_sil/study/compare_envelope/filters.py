@@ -50,8 +50,9 @@ JOINT_FILTERS = {
 
 
 def tracks(logs: Sequence[Log], joint_filter: JointFilter) -> list[Track]:
-    """Return what a joint filter says of each log, all of one chunk, at every STRIDE-th sample; NaN from where it
-    breaks down.
+    """Return what a joint filter says of each log, all of one chunk, at every STRIDE-th sample.
+
+    NaN from where it breaks down.
     """
     batch = _batch(logs, joint_filter.high_pass)
     at = np.arange(0, batch.samples, STRIDE, dtype=np.int64)
@@ -61,8 +62,9 @@ def tracks(logs: Sequence[Log], joint_filter: JointFilter) -> list[Track]:
 
 
 def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
-    """Return the batch of all logs side by side. Samples come first in memory, since filters go through them one by
-    one.
+    """Return the batch of all logs side by side.
+
+    Samples come first in memory, since filters go through them one by one.
     """
     settings = {row.name: row.default for row in settings_table()}
     signals = np.stack([np.concatenate([log.signals[name] for log in logs], axis=1) for name in _SIGNALS], axis=-1)
@@ -97,8 +99,9 @@ def held(signals: Array) -> Array:
 
 
 def high_pass(signals: Array, corner: float, start: Array) -> Array:
-    """Return signals (samples, …) without what is slower than `corner` [Hz]; they have rested at `start` (…) for
-    ever.
+    """Return signals (samples, …) without what is slower than `corner` [Hz].
+
+    They have rested at `start` (…) for ever.
     """
     sections = np.vstack([butter(2, corner, "highpass", fs=1.0 / PERIOD, output="sos")] * 2)
     return _filtered(sections, signals, start)

@@ -62,8 +62,9 @@ def rows(results: Sequence[EstimatorResult]) -> list[Row]:
 
 
 def differences(results: Sequence[EstimatorResult]) -> Differences:
-    """Return the differences of the joint filters' errors against the firmware's in each condition; without those that
-    broke down in a run.
+    """Return the differences of the joint filters' errors against the firmware's in each condition.
+
+    Those that broke down in a run are left out.
     """
     compared: Differences = {}
     for condition, group in groupby(results, key=lambda result: result.condition):

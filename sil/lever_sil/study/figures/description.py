@@ -143,8 +143,9 @@ class Figure:
         return max(float(np.nanmax(surface.magnitude)) for surface in surfaces)
 
     def limits(self) -> list[tuple[float, float]]:
-        """Return the limits of the y axes, row by row: what any column says, or all that is drawn from `scaled_from`
-        on, and a margin.
+        """Return the limits of the y axes, row by row.
+
+        They are what any column says, or all that is drawn from `scaled_from` on, and a margin.
         """
         columns = [column.content for column in self.columns if not isinstance(column.content, Surface)]
         since = max(self.x_range[0], self.scaled_from)
@@ -164,7 +165,7 @@ def _edges(trace: Trace) -> tuple[Array, ...]:
 
 
 def interval(x: Array, centre: Array, sigma: Array, name: str, look: str, *, filled: bool = True) -> Band:
-    """centre ± 2 sigma."""
+    """Return the interval centre ± 2 sigma."""
     return Band(x, centre - 2.0 * sigma, centre + 2.0 * sigma, name, look, filled)
 
 

@@ -44,7 +44,10 @@ class Scale:
 
     @property
     def position(self) -> Array:
-        """Of the cells, evenly spaced where the scale is even; names stand at 0, 1, 2 …"""
+        """Return the positions of the cells, evenly spaced where the scale is even.
+
+        Names stand at 0, 1, 2 …
+        """
         if self.is_named:
             return np.arange(len(self.values), dtype=np.float64)
         numbers = np.array(self.values, dtype=np.float64)
