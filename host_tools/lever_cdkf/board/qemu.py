@@ -41,7 +41,7 @@ class QemuError(LeverError):
 
 @contextmanager
 def running(image: Path, *, machine: str = MACHINE, count_instructions: bool = False) -> Iterator[str]:
-    """Run an SLCAN image on the emulated board until the end of the context; gives the channel for python-can's slcan.
+    """Run an SLCAN image on the emulated board until the end of the context; give the channel for python-can's slcan.
 
     `machine` is QEMU's name of the board, whose first serial line is used. The image has answered when the context
     begins. One at a time can open the channel. Raise QemuError.

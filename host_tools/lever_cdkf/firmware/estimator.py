@@ -263,7 +263,7 @@ class Estimator:
         return lib.lever_on_frame(self.pointer, received)  # type: ignore[no-any-return]
 
     def step(self) -> int:
-        """Take the sample that on_frame() has completed; returns the mode, a key of enum_names("lever_mode")."""
+        """Take the sample that on_frame() has completed; return the mode, a key of enum_names("lever_mode")."""
         return lib.lever_step(self.pointer)  # type: ignore[no-any-return]
 
     def next_frame(self) -> tuple[int, bytes] | None:

@@ -233,7 +233,7 @@ class _Counter:
             self._turn = values - 1 if protection.profile == 1 else values  # profile 1 leaves out the last
 
     def is_new(self, values: Any) -> bool:
-        """Return False for a frame that is repeated; counts it, or what was lost before it."""
+        """Return False for a frame that is repeated; count it, or what was lost before it."""
         if self._name is None or self._name not in values:
             return True
         step = 1 if self._last is None else (int(values[self._name]) - self._last) % self._turn

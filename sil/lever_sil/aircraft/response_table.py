@@ -103,8 +103,8 @@ def response_table(response: Response, band: tuple[float, float] = BAND, **said:
 def _frequencies(response: Response, low: float, high: float) -> FloatArray:
     """Return the frequencies of the table [Hz], which are in equal ratios.
 
-    Where a mode of the fuselage lies between two of them, each further one is where straight lines between the ones before
-    are furthest off.
+    Where a mode of the fuselage lies between two of them, each further one is where straight lines between the ones
+    before are furthest off.
     """
     fine = np.geomspace(low, high, 1000)
     exact = response(2j * np.pi * fine.astype(np.complex128))
