@@ -179,7 +179,7 @@ def sha256(path: str | os.PathLike[str]) -> str | None:
 
 
 def printable(text: str) -> str:
-    """Return a name as every format can hold it: bytes that are no UTF-8, and control characters, as \x07."""
+    """Return a name as every format can hold it: other bytes than UTF-8, and control characters, in hexadecimal."""
     whole = text.encode("utf-8", "backslashreplace").decode("utf-8")
     return re.sub(r"[\x00-\x1f\x7f]", lambda match: f"\\x{ord(match[0]):02x}", whole)
 

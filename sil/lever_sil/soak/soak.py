@@ -103,6 +103,8 @@ class Part:
 
 @dataclass(frozen=True)
 class SoakResult:
+    """What the hours of a soak came to."""
+
     parts: list[Part]
     settled_memory: float
     """After the first flights [MiB]."""

@@ -25,7 +25,7 @@ class Model(Protocol):
 
     @property
     def preload(self) -> str:
-        """ "fixed" or "trim"."""
+        """Return "fixed" or "trim"."""
 
     def step(self, x: Array, p: Array, u: tuple[float | Array, float | Array], trim: float | Array, dt: float) -> Array:
         """Return states (2, …) dt [s] later, of parameters (3, …) in physical units."""
