@@ -11,6 +11,8 @@
 #define MATH_EXPONENTIAL_H /* instead of these two headers: */
 #define MATH_TRIGONOMETRY_H
 
+#define TURN 6.283185307179586
+
 static inline double exponential(double x)
 {
     return exp(x);

@@ -54,7 +54,7 @@ def test_sound_memory_passes(board: Board) -> None:
         for _ in range(300):
             talk.ask()
         talk.expected()
-        board.run(850 * MS)
+        board.run(1150 * MS)
         talk.ask()
         assert answers([frame for _, frame in board.peer.heard[-1:]]) == talk.expected()[-1:]
     assert failed(board) == 0
