@@ -97,7 +97,7 @@ class LeverBus(BusABC):
         super().__init__(channel, can_filters)
 
     def send(self, msg: Message, timeout: float | None = None) -> None:
-        """Hands a frame to the firmware and queues its answers; never waits."""
+        """Hand a frame to the firmware and queue its answers; never wait."""
         data = msg.data
         if msg.is_fd or len(data) > 8:
             raise CanOperationError(f"interface 'lever' is classic CAN: it has no FD frames and no {len(data)} bytes")

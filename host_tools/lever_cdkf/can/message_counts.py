@@ -34,7 +34,7 @@ class MessageCounter:
         self.clear()
 
     def clear(self) -> None:
-        """Count start again from 0."""
+        """Start the counts again from 0."""
         self.frames = self.lost = self.corrupt = self.repeated = 0
 
     def take(self, frames: Iterable[bytes | bytearray], now: float) -> list[bytes | bytearray]:

@@ -286,7 +286,7 @@ class _Replay:
         )
 
     def finish(self, folder: Folder, summary: ReplaySummary) -> ReplaySummary:
-        """Completes the files and puts them into place; return the summary with their provenance."""
+        """Complete the files and put them into place; return the summary with their provenance."""
         summary = replace(summary, provenance=folder.complete())
         if not missing("report"):
             write_page(RecordedRun(self.kept, summary), folder.outputs.path("report.html"))

@@ -83,7 +83,7 @@ def in_processes(function: Callable[[_Task], _Done], tasks: Sequence[_Task], job
 
 
 def worker_pool(processes: int) -> Pool:
-    """Process that leave Ctrl-C to this one, from their first moment on, and hide what packages this one hides."""
+    """Return processes that from their first moment leave Ctrl-C to this one, and hide what packages this one hides."""
     import multiprocessing
 
     context = multiprocessing.get_context("spawn")
@@ -99,7 +99,7 @@ def _begin(without_mf4: bool) -> None:
 
 @contextmanager
 def masked() -> Iterator[None]:
-    """Process that this thread, or a new one, starts inside leave Ctrl-C to this one. Not on Windows."""
+    """Let processes that this thread, or a new one, starts inside leave Ctrl-C to this one. Not on Windows."""
     if sys.platform == "win32":
         yield
         return

@@ -394,7 +394,7 @@ def _reader_of(tape: _Tape, name: str) -> Callable[[int], float]:
 
 
 def _grip_sender(tape: _Tape, link: _Link) -> Callable[[int], None] | None:
-    """Send the GRIP_SAMPLE of a sample; None without that sensor."""
+    """Return a function that sends the GRIP_SAMPLE of a sample; None without that sensor."""
     if tape.scenario.sensors.grip_force is None:
         return None
     read, send, encode = _reader_of(tape, "grip_force"), link.sender("GRIP_SAMPLE"), codec.encoder("GRIP_SAMPLE")

@@ -59,7 +59,7 @@ def _without_empty(values: Values) -> Values:
 
 
 def _pilot(rng: np.random.Generator, grips: np.ndarray[Any, Any], off: float) -> Values:
-    """Drifts all the time, and takes another grip at some times."""
+    """Return a pilot who drifts all the time, and takes another grip at some times."""
 
     def drifting(unit: str, least: float, greatest: float, rate: float) -> Values:
         parts = []

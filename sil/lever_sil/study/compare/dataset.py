@@ -38,7 +38,7 @@ _TRUE = ("true_theta_rad", "true_theta_dot_rad_s", "true_natural_frequency_Hz", 
 
 
 def write(folder: Path, names: list[str], plan: Plan) -> Iterator[str]:
-    """Write the cases `names`; yields each when it is written. Raise LeverError."""
+    """Write the cases `names`; yield each when it is written. Raise LeverError."""
     require("files", "pyarrow")
     from pyarrow import parquet
 
