@@ -342,9 +342,8 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     evidence_set(evidence, EVIDENCE_STICKING,
         sticking_judge(&evidence->sticking, evidence->motion.slow, cdkf->output_noise[1], moves && driven));
     evidence_set(evidence, EVIDENCE_COLOUR, whiteness_correlation(&evidence->whiteness));
-    if (adapts && moves && !block->held &&
-        (evidence->ratio[EVIDENCE_BASE] <
-            CHANGE_WAITS)) { /* of an arm that has changed meanwhile it would say the same */
+    /* an arm that has changed meanwhile would say the same as an error of the base */
+    if (adapts && moves && !block->held && (evidence->ratio[EVIDENCE_BASE] < CHANGE_WAITS)) {
         evidence_set(evidence, EVIDENCE_CALIBRATION, calibration_step(&evidence->calibration, cdkf, period));
     }
     evidence_set(evidence, EVIDENCE_INNOVATION, evidence->nis_slow);

@@ -299,11 +299,11 @@ static bool is_drawn(const estimator_t *estimator)
     return same;
 }
 
-/* The filter's invariant, and that its factors are triangular. */
+/* The filter's invariant, and that its factors are some. */
 static bool is_belief(const cdkf_t *cdkf)
 {
-    return cdkf_is_valid(cdkf) && factor_is_whole(cdkf->s, MODEL_PARAMETERS) &&
-           factor_is_whole(cdkf->s_xx, MODEL_STATES);
+    return factor_is_whole(cdkf->s, MODEL_PARAMETERS) && factor_is_whole(cdkf->s_xx, MODEL_STATES) &&
+           cdkf_is_valid(cdkf);
 }
 
 /* A belief that may be returned to keeps the invariant, too. */

@@ -6,8 +6,8 @@
 
 #include <math.h>
 
-/* Of gain and of phase [1], [rad^2], where a trunk on a seat is part of the model: what its filter is off by with seat
- * settings that are 10 % off. */
+/* Variance of gain [1] and of phase [rad^2] where a trunk on a seat is part of the model: its filter is off by so much
+ * with seat settings that are 10 % off. */
 #define SEAT_VARIANCE 1.6e-3f
 
 /* Standard deviations of two quantities, and the covariance of their errors. */

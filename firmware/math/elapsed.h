@@ -6,7 +6,7 @@
 
 #include <stdint.h>
 
-/* Of two times that may wrap, the one that is less than this after the other is the later [us]. */
+/* Times may wrap: one that is less than this after another is the later of the two [us]. */
 #define HALF_TURN_OF_TIME 0x80000000u
 
 /* The nearest number of microseconds. */

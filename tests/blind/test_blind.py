@@ -16,8 +16,6 @@ from blind.disagreements import DISAGREEMENTS
 from blind.flights import EVENTS, MODES, Event, Flight, Mode, applies, flight
 
 Rule = Callable[[Flight], list[str]]
-AFTER_A_FALSE_ALARM = "after_gap"
-"""In this state THETA shows falsely (see truthful), with the same end in each event: one of them is enough."""
 
 
 def cases(
@@ -54,7 +52,7 @@ def reported(event: Event, mode: Mode) -> bool:
 
 def dithers(event: Event, mode: Mode) -> bool:
     """Return whether the dither of a flight is to be looked at."""
-    return mode.torque == "dither" and (mode.state != AFTER_A_FALSE_ALARM or event.name == "nothing")
+    return mode.torque == "dither"
 
 
 OUTAGES = ("outputs_missing", "gap_50ms", "gap_1s")

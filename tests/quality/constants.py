@@ -14,12 +14,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+if __name__ == "__main__":
+    sys.path[0] = str(Path(__file__).resolve().parent.parent)
+
 from lever_cdkf.cli.tables import Row, print_tables
+from quality import definitions
 
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 FOLDERS = ("math", "model", "filter", "bounce", "app")
 _DEFINE = re.compile(r"^#define (\w+) +(-?\d[\w.+-]*)(?: +/\* (.*?) \*/)?$", re.MULTILINE)
-_EVIDENCE = re.compile(r'^EVIDENCE\((\w+), ([\d.]+)f?, .*"(?:state: )?(.*)"\)$', re.MULTILINE)
 _BRACKETS = re.compile(r"\[([^\]]*)\]")
 _UNIT = re.compile(r"^(?:1|(?:(?:1/)?(?:sqrt\()?(?:rad|s|m|N|g|dB|Hz|us|unit)\b[\^\d/)√ ]*)+)$")
 
@@ -48,7 +51,7 @@ def constants() -> Iterator[Constant]:
             file = str(path.relative_to(FIRMWARE))
             for name, value, meaning in _DEFINE.findall(path.read_text(encoding="utf-8")):
                 yield Constant(name, value, file, meaning)
-    for name, value, meaning in _EVIDENCE.findall((FIRMWARE / "app/evidence.def").read_text(encoding="utf-8")):
+    for name, value, *_, meaning in definitions.rows("evidence"):
         yield Constant(name, value, "app/evidence.def", meaning)
 
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator
-
 import pytest
 from lever_cdkf.can import codec
 from lever_cdkf.firmware.estimator import TEST_RATIOS
-from quality import tools
+from quality.definitions import APP, rows
 
-APP = tools.FIRMWARE / "app"
 COLUMNS = {
     "verdict": (
         "verdict",
@@ -26,25 +22,6 @@ COLUMNS = {
     ),
     "evidence": ("evidence", "threshold", "off", "shows as", "is"),
 }
-
-
-def rows(name: str) -> Iterator[list[str]]:
-    """Yield the cells of each row of NAME.def, as a reader gets to see them."""
-    text = (APP / f"{name}.def").read_text(encoding="utf-8")
-    for arguments in re.findall(rf"^{name.upper()}\((.*)\)$", text, re.MULTILINE):
-        *cells, meaning = re.fullmatch(r'(.*), "(.*)"', arguments).groups()  # type: ignore[union-attr]
-        yield [*(cell(each) for each in cells[0].split(", ")), meaning]
-
-
-def cell(text: str) -> str:
-    """Return a cell of a .def file in words."""
-    words = re.sub(r"ON\(EVIDENCE_(\w+)\)", r"\1", text)
-    words = words.replace("(uint32_t)", "")
-    words = re.sub(r"\b(EVIDENCE|VERDICT|LEVER_FAULT)_", "", words).replace(" |", ",")
-    number = re.fullmatch(r"(-?[\d.]+)f", words)
-    return {"NOTHING": "", "NEVER": "", "0": "", "0u": "", "1": "yes", "ALWAYS": "yes"}.get(
-        words, f"{float(number[1]):g}" if number else words.lower()
-    )
 
 
 def table(name: str) -> str:

@@ -1,4 +1,4 @@
-"""What an estimator is given of the helicopter, to tell how near collective bounce is.
+"""The description of the helicopter by which an estimator tells how near collective bounce is.
 
 It is also a file, which lever_can reads as well (firmware/port/linux/aircraft.h says what is in it).
 """

@@ -14,7 +14,7 @@ _NO_TRUTH = 2.0  # [Hz] of f_n: what is below is the lever alone, without an arm
 
 TITLES = {"f_n": "natural frequency [Hz]", "zeta": "damping ratio", "m_p": "m_p [kg]", "c_p": "c_p [N s/m]",
           "k_p": "k_p [N/m]"}  # fmt: skip
-"""Of the y axes, by quantity."""
+"""Titles of the y axis by quantity."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Excerpt:
     """Columns at a few hundred times."""
 
     quantity: str
-    """Of TITLES."""
+    """A key of TITLES."""
     time: FloatArray
     """[s]"""
     truth: FloatArray

@@ -147,7 +147,7 @@ def closed_loop(
 
 
 class _Notes:
-    """What the estimators of `width` runs say at every STRIDE-th of `count` samples; run first.
+    """The outputs of the estimators of `width` runs at every STRIDE-th of `count` samples; run first.
 
     With `response` it is also their feedthrough at every RESPONSE_STRIDE-th of these.
     """

@@ -40,7 +40,7 @@ AT_LAST = 5.0
 
 @dataclass(frozen=True)
 class Requirement:
-    """What a row demands.
+    """The demands of a row.
 
     Besides, of every row: estimates are finite and not wrong without a flag, each sample is answered, torque keeps
     within the gate's limits, and the firmware is back in the end.

@@ -103,7 +103,7 @@ class Part:
 
 @dataclass(frozen=True)
 class SoakResult:
-    """What the hours of a soak came to."""
+    """The results of a soak, hour by hour."""
 
     parts: list[Part]
     settled_memory: float

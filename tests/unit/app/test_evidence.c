@@ -457,8 +457,8 @@ TEST(a_standstill_counts_while_the_base_goes_on)
     TEST_ASSERT_TRUE(fabsf(stick(50u, 0.4f)) > 0.0f);
 }
 
-/* Angle and rate are compared over a line between samples of 10.5 ms, or one and a half periods, and where neither jumps
- * by 0.03 rad more than the other. */
+/* Angle and rate are compared over a line between samples of 10.5 ms, or one and a half periods, and where neither
+ * jumps by 0.03 rad more than the other. */
 TEST(angle_and_rate_are_compared_from_sample_to_sample_only)
 {
     static const struct {

@@ -307,8 +307,15 @@ static uint32_t run_off(uint32_t count, float offset)
     return faults;
 }
 
-/* An angle that jumps while the rate goes on has another offset: that teaches nothing. While the parameters are held they
- * do not belong to the angle shown, until it is back. */
+static void request_both(enum lever_request what)
+{
+    lever_command_t command = command_none();
+    command.request = (uint8_t)what;
+    TEST_ASSERT_TRUE(lever_command(lever, &command) && lever_command(other, &command));
+}
+
+/* An angle that jumps while the rate goes on has another offset: that teaches nothing. While the parameters are held
+ * they do not belong to the angle shown, until it is back. */
 /* R33 */
 TEST(an_angle_that_jumps_without_the_rate_has_another_offset)
 {
@@ -316,14 +323,7 @@ TEST(an_angle_that_jumps_without_the_rate_has_another_offset)
                            (uint32_t)LEVER_FAULT_MISMATCH | (uint32_t)LEVER_FAULT_BASE | (uint32_t)LEVER_FAULT_SETTLING;
     run_both(8000u);
     for (uint32_t frozen = 0u; frozen <= 1u; frozen++) {
-        const lever_command_t command = {
-            .request = (uint8_t)((frozen != 0u) ? LEVER_REQUEST_FREEZE : LEVER_REQUEST_RUN),
-            .model = (uint8_t)LEVER_KEEP,
-            .preload = (uint8_t)LEVER_KEEP,
-            .estimator = (uint8_t)LEVER_KEEP,
-            .adaptation = (uint8_t)LEVER_KEEP,
-            .mitigation = (uint8_t)LEVER_KEEP};
-        TEST_ASSERT_TRUE(lever_command(lever, &command) && lever_command(other, &command));
+        request_both((frozen != 0u) ? LEVER_REQUEST_FREEZE : LEVER_REQUEST_RUN);
         const uint32_t at_first = run_off(40u, 0.1f);
         const uint32_t then = run_off(2000u, 0.1f);
         TEST_ASSERT_EQUAL_UINT32((uint32_t)LEVER_FAULT_THETA, at_first & (wrong | (uint32_t)LEVER_FAULT_THETA));
@@ -337,8 +337,8 @@ TEST(an_angle_that_jumps_without_the_rate_has_another_offset)
     }
 }
 
-/* While the parameters are held, jumps add up: what is left counts above 0.02 rad, until the angle is measured anew after
- * an outage. */
+/* While the parameters are held, jumps add up: what is left counts above 0.02 rad, until the angle is measured anew
+ * after an outage. */
 /* R33 */
 TEST(what_is_left_of_an_offset_counts)
 {
@@ -347,13 +347,7 @@ TEST(what_is_left_of_an_offset_counts)
         bool wrong;
     } row[] = {{0.075f, true}, {0.085f, false}, {0.1f, false}};
     run_both(8000u);
-    const lever_command_t command = {.request = (uint8_t)LEVER_REQUEST_FREEZE,
-        .model = (uint8_t)LEVER_KEEP,
-        .preload = (uint8_t)LEVER_KEEP,
-        .estimator = (uint8_t)LEVER_KEEP,
-        .adaptation = (uint8_t)LEVER_KEEP,
-        .mitigation = (uint8_t)LEVER_KEEP};
-    TEST_ASSERT_TRUE(lever_command(lever, &command) && lever_command(other, &command));
+    request_both(LEVER_REQUEST_FREEZE);
     for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
         (void)run_off(1000u, 0.1f);
         TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_THETA));
