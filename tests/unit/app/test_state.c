@@ -4,6 +4,8 @@
 #include "frames.h"
 #include "port/embedded/crc32.h"
 
+#include <float.h>
+#include <math.h>
 #include <stddef.h>
 
 enum { FIRST_ROW = 1 }; /* byte 0 says whether there is an aircraft */
@@ -248,6 +250,29 @@ TEST(a_covariance_that_is_none_a_negative_square_or_time_and_points_that_are_not
     }
     lever_state_save(lever, state);
     TEST_ASSERT_TRUE(lever_state_restore(other, state));
+}
+
+/* Numbers that are none, and too large ones, in each signal of the last sample, whether its sender calls it valid or not.
+ */
+/* R53 */
+TEST(whatever_the_last_sample_was_the_state_can_be_restored)
+{
+    static const float values[] = {NAN, INFINITY, -INFINITY, FLT_MAX};
+    start_bus();
+    fly(400u);
+    for (uint32_t k = 0u; k < 5u * 2u * 4u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        float *const signal[] = {&sample.theta, &sample.theta_dot, &sample.tau_m, &sample.z_ddot, &sample.grip_force};
+        bool *const valid[] = {&sample.theta_valid, &sample.theta_dot_valid, &sample.tau_m_valid, &sample.z_ddot_valid,
+            &sample.grip_force_valid};
+        *signal[k % 5u] = values[k / 10u];
+        *valid[k % 5u] = ((k / 5u) % 2u) != 0u;
+        (void)lever_update(lever, &sample);
+        lever_state_save(lever, state);
+        lever_t *restored = lever_init(&other_memory, &config);
+        TEST_ASSERT_TRUE(lever_state_restore(restored, state));
+        assert_same_future(restored);
+    }
 }
 
 /* Samples by struct and by bus, silence and all that is asked, of the instance `hurt`. */
