@@ -6,6 +6,7 @@
 #include <stddef.h>
 
 #define DELAY_WHOLE 0.99f /* a delay is rounded up, but for a hundredth of a sample */
+#define WALK_MAX 1.0e4f   /* of w, in squares: more does nothing, as its standard deviation is capped [1/s] */
 
 const model_t *setup_model(uint8_t model)
 {
@@ -84,7 +85,7 @@ adaptation_t setup_adaptation(const setup_t *setup)
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         /* of the scaled parameter w, see model/scaling.h */
         const float walk = setup->model_in_use->positive ? rows.walk[i] : (rows.walk[i] / rows.prior.sigma[i]);
-        adaptation.floor[i] = walk * walk;
+        adaptation.floor[i] = lesser(walk * walk, WALK_MAX);
     }
     return adaptation;
 }

@@ -319,7 +319,6 @@ static bool is_moderate(const cdkf_t *cdkf)
 {
     float size = cdkf->growth;
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
-        size += fabsf(cdkf->walk[i]);
         for (uint32_t c = 0u; c < (uint32_t)CDKF_CONSIDERED; c++) {
             size += fabsf(cdkf->considered[c].w[i]);
         }

@@ -1,11 +1,14 @@
 #include "filter/calibration.h"
 
+#include "math/bounds.h"
+
 #include <math.h>
 #include <string.h>
 
 #define CALIBRATION_MEMORY 20.0f /* [s] */
 #define STATED 2.0f              /* an error may be so many standard deviations of what is stated, */
 #define NOISE 4.0f               /* and so many of those of the innovations [rough] */
+#define LIMIT_MIN 1.0e-9f        /* information underflows to 0 before the vector does */
 
 void calibration_start(calibration_t *calibration)
 {
@@ -24,9 +27,7 @@ float calibration_step(calibration_t *calibration, const cdkf_t *cdkf, float per
         /* vector = information b + noise of variance information */
         const float limit =
             (STATED * (cdkf->considered_sigma[c] * sum->information)) + (NOISE * sqrtf(sum->information));
-        if (fabsf(sum->vector) > (largest * limit)) {
-            largest = fabsf(sum->vector) / limit;
-        }
+        largest = greater(largest, fabsf(sum->vector) / greater(limit, LIMIT_MIN));
     }
     return largest;
 }

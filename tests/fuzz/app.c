@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "app/instance.h"
+#include "app/state.h"
 #include "can/e2e.h"
 #include "can/messages.h"
 #include "lever_cdkf.h"
@@ -23,6 +24,8 @@ enum {
     OUTPUT_IDS = 15,
     FIRST_OUTPUT = 0x210
 };
+
+#define LARGE 1.0e6f /* no member is as large in a flight */
 
 static uint64_t steps; /* of all inputs */
 
@@ -422,6 +425,23 @@ static void use(bench_t *bench, lever_t *lever)
     }
 }
 
+/* Settings and samples anywhere in their ranges can make numbers that a state may not have; NaN is never made. */
+static bool is_extreme(const lever_t *lever)
+{
+    const uint8_t *memory = (const uint8_t *)lever;
+    bool is_large = false;
+    for (uint32_t i = 0u; i < state_row_count(); i++) {
+        const state_row_t *row = state_row(i);
+        for (uint32_t k = 0u; row->is_float && (k < row->count); k++) {
+            float value;
+            (void)memcpy(&value, &memory[row->offset + (k * row->size)], sizeof value);
+            REQUIRE(isfinite(value));
+            is_large = is_large || (fabsf(value) > LARGE);
+        }
+    }
+    return is_large;
+}
+
 /* As it is, the state of an instance makes another one the same. */
 static void move_state(bench_t *bench, input_t *input)
 {
@@ -431,9 +451,13 @@ static void move_state(bench_t *bench, input_t *input)
     lever_t *other = lever_init(&memory, &bench->config);
     (void)lever_aircraft(other, bench->lever->bounce.aircraft);
     lever_state_save(bench->lever, state);
-    REQUIRE(lever_state_restore(other, state));
-    lever_state_save(other, again);
-    REQUIRE(memcmp(state, again, sizeof state) == 0);
+    const bool large = is_extreme(bench->lever);
+    if (lever_state_restore(other, state)) {
+        lever_state_save(other, again);
+        REQUIRE(memcmp(state, again, sizeof state) == 0);
+    } else {
+        REQUIRE(large);
+    }
     const uint8_t changed = take_byte(input) & 7u;
     for (uint32_t i = 0u; i < changed; i++) {
         const uint32_t at = take_byte(input) | ((uint32_t)take_byte(input) << 8u);

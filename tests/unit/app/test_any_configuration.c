@@ -8,6 +8,7 @@ enum { CONFIGURATIONS = 900 };
 #endif
 
 static random_source_t source;
+static lever_memory_t other_memory;
 
 /* Anywhere in the range: by decades where it is positive, and from 0 or six decades on where it begins at 0. */
 static float draw_setting(const lever_setting_t *setting)
@@ -78,7 +79,15 @@ TEST(with_any_samples_it_stays_finite)
     }
 }
 
+static void assert_its_state_can_be_restored(void)
+{
+    uint8_t state[LEVER_STATE_BYTES];
+    lever_state_save(lever, state);
+    TEST_ASSERT_TRUE(lever_state_restore(lever_init(&other_memory, &config), state));
+}
+
 /* Half of the settings as they are, samples as they should be: then nothing is ever refused either. */
+/* R53 */
 TEST(with_good_samples_it_needs_no_restart)
 {
     source.state = 7u;
@@ -91,6 +100,7 @@ TEST(with_good_samples_it_needs_no_restart)
             (void)lever_update(lever, &sample);
         }
         assert_finite(estimate());
+        assert_its_state_can_be_restored();
         TEST_ASSERT_EQUAL_UINT32(0u, health().recoveries);
     }
 }

@@ -64,6 +64,16 @@ TEST(a_larger_one_is_found_for_each_error_and_sign_and_again_within_when_it_is_g
     }
 }
 
+/* Long after the last torque its high-passed rest is so small that its square, the information, is 0 in float. */
+TEST(nothing_is_found_where_the_information_has_underflowed)
+{
+    (void)memset(cdkf.considered, 0, sizeof cdkf.considered);
+    cdkf.considered[CDKF_TORQUE_GAIN].vector = 1.0e-22f;
+    TEST_ASSERT_TRUE(calibration_step(&calibration, &cdkf, PERIOD) < 1.0f);
+    cdkf.considered[CDKF_TORQUE_GAIN].vector = -1.0e-38f;
+    TEST_ASSERT_TRUE(calibration_step(&calibration, &cdkf, PERIOD) < 1.0f);
+}
+
 /* Without noise: the score of many times MEMORY is what comes in MEMORY; the limit is 2 sigma + 4 / sqrt(information). */
 TEST(limits_and_memory_are_what_is_said)
 {
