@@ -361,6 +361,24 @@ TEST(rough_air_that_begins_in_flight_is_noise_and_no_change)
     TEST_ASSERT_FLOAT_WITHIN(0.06f * before.natural_frequency, before.natural_frequency, estimate().natural_frequency);
 }
 
+/* Sums that begin anew with the noise say nothing, and no verdict of the old ones stays where nothing is learnt. */
+TEST(with_other_noise_calibration_is_judged_anew)
+{
+    random_source_t source = {77u};
+    evidence_t *evidence = &lever->estimator.learning.evidence;
+    start_with(0u, (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
+    (void)run(10000u);
+    const float *vector = &evidence->calibration.score[CDKF_BASE_GAIN].vector;
+    evidence->calibration.score[CDKF_BASE_GAIN].vector = 1.0e9f;
+    for (uint32_t ms = 0u; (ms < 8000u) && (*vector > 1.0e6f); ms++) {
+        simulation.theta_dot += 0.5 * sqrt(1.0e-3) * random_normal(&source);
+        (void)run(1u);
+        TEST_ASSERT_TRUE((ms < 100u) || (*vector < 1.0e6f) || evidence_has(evidence, EVIDENCE_CALIBRATION));
+    }
+    TEST_ASSERT_TRUE(*vector < 1.0e6f);
+    TEST_ASSERT_FALSE(evidence_has(evidence, EVIDENCE_CALIBRATION));
+}
+
 /* --- frozen ------------------------------------------------------------------------------------------------------- */
 
 enum wrong { BASE_STUCK, BASE_SIGN, THETA_STUCK, TORQUE_SIGN, WRONGS };
