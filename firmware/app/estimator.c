@@ -262,8 +262,6 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
     if (estimator->restarts > 0.0f) {
         estimator->restarts -= estimator->restarts * lesser(elapsed * RESTARTS_FORGOTTEN, 1.0f);
     }
-    note(estimator, estimator->trim.unsettled > 0.0f, LEVER_FAULT_SETTLING);
-    estimator->faults |= learning->evidence.faults;
     estimator->mode = mode_of(estimator, measured);
 }
 
@@ -286,6 +284,22 @@ static void watch_alignment(estimator_t *estimator, float elapsed)
 {
     evidence_note(&estimator->learning.evidence, EVIDENCE_MISSING, true);
     (void)learning_step(&estimator->learning, &estimator->setup, &estimator->cdkf, true, elapsed);
+}
+
+/* The filter, or what comes before it, takes a sample. */
+static void advance(estimator_t *estimator, checked_t *sample, const inputs_t *last, float elapsed, uint32_t periods)
+{
+    if (elapsed > estimator->setup.settings->gap_limit) {
+        learning_skip(&estimator->learning, &estimator->setup, &estimator->cdkf, elapsed);
+        alignment_begin(estimator, sample);
+    } else if (estimator->mode == LEVER_MODE_ALIGN) {
+        watch_alignment(estimator, elapsed);
+        alignment_step(estimator, sample, elapsed);
+    } else {
+        prediction_advance(estimator, sample, last, elapsed, periods);
+        correct(estimator, sample, elapsed);
+    }
+    note(estimator, (estimator->mode != LEVER_MODE_ALIGN) && (estimator->trim.unsettled > 0.0f), LEVER_FAULT_SETTLING);
     estimator->faults |= estimator->learning.evidence.faults;
 }
 
@@ -299,19 +313,8 @@ static void step(estimator_t *estimator, checked_t *sample, const inputs_t *last
         estimator->lost += periods - 1u;
         note(estimator, true, LEVER_FAULT_GAP);
     }
-    if (estimator->mode == LEVER_MODE_FAULT) {
-        /* only a reset leaves it */
-    } else if (elapsed > estimator->setup.settings->gap_limit) {
-        learning_skip(&estimator->learning, &estimator->setup, &estimator->cdkf, elapsed);
-        alignment_begin(estimator, sample);
-    } else if (estimator->mode == LEVER_MODE_ALIGN) {
-        watch_alignment(estimator, elapsed);
-        alignment_step(estimator, sample, elapsed);
-        note(
-            estimator, (estimator->mode == LEVER_MODE_RUN) && (estimator->trim.unsettled > 0.0f), LEVER_FAULT_SETTLING);
-    } else {
-        prediction_advance(estimator, sample, last, elapsed, periods);
-        correct(estimator, sample, elapsed);
+    if (estimator->mode != LEVER_MODE_FAULT) { /* only a reset leaves it */
+        advance(estimator, sample, last, elapsed, periods);
     }
 }
 

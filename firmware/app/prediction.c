@@ -138,7 +138,7 @@ static void take_offset(estimator_t *estimator, const checked_t *sample)
     if (believed && sample->valid[1] && (evidence->refused[1] <= 0.0f) && trim->deviations && (fabsf(jump) > JUMP)) {
         trim_shift(trim, jump);
         evidence->offset += jump;
-        estimator->faults |= LEVER_FAULT_THETA; /* of this sample; the end of its block judges what is left */
+        evidence->faults |= LEVER_FAULT_THETA; /* until the end of the block, which judges what is left */
     }
 }
 
