@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from lever_cdkf.cli.layout import say
 from lever_cdkf.runtime.extras import require
 
+from .names import seed
+
 _PAGE, _CAPTIONS, _PROVENANCE = "figures.html", "captions.md", "provenance.json"
 
 if TYPE_CHECKING:
@@ -72,14 +74,6 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     parser.add_argument("--paper", action="store_true", help="the five figures of the paper, instead of all of ours")
     parser.add_argument("--list", action="store_true", help="print the names of all figures")
-
-
-def seed(text: str) -> int:
-    """Return a seed from the command line."""
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"{value} is negative")
-    return value
 
 
 def run(args: argparse.Namespace) -> int:

@@ -14,6 +14,8 @@ from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
 from lever_cdkf.runtime.files import check_writable, json_text, write_texts
 
+from .names import seed
+
 if TYPE_CHECKING:
     from ..soak.soak import SoakResult
 
@@ -43,7 +45,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "soak", help="simulate a day of flights without a reset", description=_DESCRIPTION, epilog=_EPILOG
     )
     parser.add_argument("--hours", type=float, default=24.0, metavar="H", help="simulated (default: 24)")
-    parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default: 1)")
+    parser.add_argument("--seed", type=seed, default=1, help="of all random numbers (default: 1)")
     parser.add_argument("-o", "--out", metavar="FILE", help="also write a page with charts over the hours")
     parser.add_argument("--json", metavar="FILE", help='also write the hours to FILE: {"hours": [{"NEES [1]", …}], …}')
     parser.set_defaults(run=run)

@@ -264,8 +264,25 @@ def load(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
     """
     if not isinstance(name_or_path, (str, os.PathLike)):
         raise ScenarioError(f"{name_or_path!r} is no scenario: give its name, or the path of a .toml file")
-    name = os.fspath(name_or_path)
-    return from_toml(SHELF.content(name), name, overrides)
+    name, given = os.fspath(name_or_path), list(overrides)
+    content = SHELF.content(name)
+    try:
+        return from_toml(content, name, given)
+    except ScenarioError as error:
+        raise ScenarioError(_with_cause(str(error), content, name, given)) from None
+
+
+def _with_cause(said: str, content: bytes, name: str, overrides: list[str]) -> str:
+    """Return an error with the first override that it occurs with in place of the file, unless it is the file's own."""
+    for count in range(len(overrides) + 1):
+        try:
+            from_toml(content, name, overrides[:count])
+        except ScenarioError as error:
+            if str(error) == said:
+                break
+    if count == 0 or said.startswith("--set "):
+        return said
+    return f"--set {overrides[count - 1]}: {said.removeprefix(f'{file_of(name)}: ')}"
 
 
 def from_toml(content: bytes, name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:

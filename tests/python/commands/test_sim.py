@@ -75,7 +75,8 @@ def test_settings_prints_a_settings_file_for_the_firmware(lever: Run, tmp_path: 
     [
         (("sim", "nope"), "no scenario 'nope'; there are base_dither"),
         (("sim",), "one of the arguments"),
-        (("sim", "steady", "--set", "pilot.m_p=3"), "steady.toml: pilot.m_p: 3 is not a quantity"),
+        (("sim", "steady", "--set", "pilot.m_p=3"), "lever: error: --set pilot.m_p=3: pilot.m_p: 3 is not"),
+        (("sim", "steady", "--seed", "-1"), "argument --seed: -1 is not from 0 to "),
         (("sim", "steady", "--interface", "slcan"), "--interface slcan needs --channel"),
         (
             ("sim", "steady", "--interface", "slcan", "--channel", "/dev/nothing"),

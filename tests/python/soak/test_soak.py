@@ -84,7 +84,9 @@ def test_what_is_wrong_shows() -> None:
     ]
 
 
-def test_wrong_hours_are_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_wrong_hours_and_seeds_are_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     for hours in ("0", "-1", "nan", "1e9"):
         assert main(["soak", f"--hours={hours}"]) == 2
         assert "above 0, and at most 1000" in capsys.readouterr().err
+    assert main(["soak", "--seed=-1"]) == 2
+    assert "argument --seed: -1 is not from 0" in capsys.readouterr().err

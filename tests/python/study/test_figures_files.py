@@ -374,7 +374,7 @@ def test_the_figures_of_the_paper_have_its_numbers_and_say_what_differs(lever: R
         (("--only", "grips"), "unknown figure 'grips'; did you mean grip?"),
         (("--only", "states", "none"), "unknown figure 'none'; there are bode"),
         (("--only",), "argument --only: expected at least one argument (see `lever figures --help`)"),
-        (("--seed", "-1"), "argument --seed: -1 is negative"),
+        (("--seed", "-1"), "argument --seed: -1 is not from 0 to "),
         (("--seed", "x"), "argument --seed: invalid seed value: 'x'"),
     ],
 )
