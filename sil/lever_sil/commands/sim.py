@@ -97,7 +97,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     sim.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="set a value of the scenario; may be repeated"
     )
-    sim.add_argument("--seed", type=seed, help="set the seed of all random numbers; with --seeds the first (default: 1)")
+    sim.add_argument("--seed", type=seed, help="seed of all random numbers; with --seeds the first (default: 1)")
     sim.add_argument("--seeds", type=int, metavar="N", help="run N times, with consecutive seeds: median and worst")
     sim.add_argument("--jobs", type=int, metavar="N", help="with --seeds: processes (default: one a core)")
     sim.add_argument(

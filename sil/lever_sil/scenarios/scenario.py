@@ -277,7 +277,7 @@ def _with_cause(said: str, content: bytes, name: str, overrides: list[str]) -> s
     for count in range(len(overrides) + 1):
         try:
             from_toml(content, name, overrides[:count])
-        except ScenarioError as error:
+        except ScenarioError as error:  # noqa: PERF203
             if str(error) == said:
                 break
     if count == 0 or said.startswith("--set "):

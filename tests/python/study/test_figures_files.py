@@ -385,6 +385,10 @@ def test_what_is_wrong_is_said_in_a_line(lever: Run, tmp_path: Path, arguments: 
     assert list(tmp_path.iterdir()) == []
 
 
+def test_without_a_folder_nothing_is_drawn(lever: Run) -> None:
+    assert lever("figures") == (2, "", "lever: error: -o DIR is missing: the folder for the files\n")
+
+
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(
     lever: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
