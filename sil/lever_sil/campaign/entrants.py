@@ -168,6 +168,7 @@ ENTRANTS: Mapping[str, Entrant] = {
         Published("joint_ekf", 0.03),
         Published("joint_ukf", 0.05),
         Published("rls", 0.05),
+        Published("rls_regularised", 0.05),
         Published("lms", 0.05),
     )
 }

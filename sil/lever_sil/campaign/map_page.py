@@ -27,7 +27,7 @@ def build(
         chart = page.figure(f"{figure.name}-chart", drawn.spec(figure), html.escape(figure.caption))
         page.section(figure.name, figure.title, figure.title, chart)
     page.section("border", "Border", "Where tracking fails", rows_table(border))
-    page.section("estimators", "Estimators", "All runs of each estimator", rows_table(by_estimator))
+    page.section("estimators", "Estimators", "All runs of each estimator: median rms errors", rows_table(by_estimator))
     return page.html(f'<p class="verdict">{_verdict(cells, spec.failure)}</p>')
 
 

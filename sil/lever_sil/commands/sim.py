@@ -39,6 +39,9 @@ before the next one is sent. Prints how good the estimates were; with --out also
   summary.json   errors, coverage, times to converge, innovations, counts, a verdict, and where the files come from
   report.html    all of it as one page for a browser
 
+Errors are relative to the truth, from converged_after on. "below 10 % after" is the time from the start, and from each
+jump of the truth, until the error stays below 10 %.
+
 With --seeds N it runs the scenario N times, each time with other random numbers, in as many processes as there are
 cores, and prints median and worst over the runs: a single run is one draw of noise and vibration. Its only file is
 that of --json. The columns are, for each quantity,
@@ -305,8 +308,8 @@ def _tables(result: SimulationResult) -> Tables:
                 "rms error [%]": entry.rms_percent if entry else None,
                 "bias [%]": entry.bias_percent if entry else None,
                 "truth within 2 sigma [1]": entry.coverage_2sigma if entry else None,
-                "time to 10 % [s]": _times(entry.time_to_10_percent_s if entry else ()),
-                "time to 5 % [s]": _times(entry.time_to_5_percent_s if entry else ()),
+                "below 10 % after [s]": _times(entry.time_to_10_percent_s if entry else ()),
+                "below 5 % after [s]": _times(entry.time_to_5_percent_s if entry else ()),
             }
         )
     run_row: Row = {

@@ -76,8 +76,8 @@ class Sums:
         return {
             "flights": round(self.seconds / DURATION),
             "flagged [%]": 100.0 * (1.0 - self.unflagged / max(self.judged, 1)),
-            "NEES [1]": self.nees / shown,
-            "NIS [1]": self.nis / shown,
+            "NEES (expected 1)": self.nees / shown,
+            "NIS (expected 1)": self.nis / shown,
             **{f"{name} within 2 sigma [%]": 100.0 * count / shown for name, count in self.within.items()},
             "silent [s]": self.silent_s,
             **{name: self.counts[name] for name in ("lost", "late", "corrupt", "recoveries")},

@@ -29,6 +29,7 @@ def test_sim_writes_its_files_and_prints_its_tables(lever: Run, tmp_path: Path) 
     assert summary["samples"] == 1000
     assert summary["passed"]
     assert summary["verdict"] in out
+    assert "below 10 % after [s]" in out
     assert len((out_dir / "trace.csv").read_text().splitlines()) == 1001
     assert "<html" in (out_dir / "report.html").read_text()[:200]
     title, run, _ = json.loads(tables.read_text()).values()

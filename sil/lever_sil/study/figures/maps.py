@@ -29,6 +29,7 @@ _RED = "#e63c3c"
 _FLAT, _MOST, _HEADROOM = 0.7, 1.35, 0.75  # height of a chart over its width and at most, and of all else [inches]
 _BESIDE = 1.2  # [inches] left and right of the charts
 _CELL, _TITLE, _FOOT = 170, 60, 60  # [pixels] of a chart, and above and below all
+_LETTER, _LABEL = 7, 44  # [pixels] left of all, for a letter of a tick of the y axis and for the label
 _GAP = 0.03  # between charts of the page, at least, as part of the whole
 
 
@@ -72,7 +73,7 @@ class Scale:
         return sorted({round(at) for at in np.linspace(0.0, len(self.values) - 1.0, most)})
 
     def value(self, position: float) -> float:
-        """Return what is at a position; infinities stay."""
+        """Return what is at a position; infinities and NaN stay."""
         return float(np.exp(position)) if self.is_log else position
 
     def place(self, values: Array) -> Array:
@@ -126,9 +127,21 @@ class MapFigure:
     """By row and column."""
 
 
-def written(value: float | str) -> str:
-    """Return a value of a scale."""
-    return value if isinstance(value, str) else f"{value:.2g}"
+def written(value: float | str, digits: int = 2) -> str:
+    """Return a value of a scale; a number with at least so many digits, and no exponent where it is large."""
+    if isinstance(value, str):
+        return value
+    text = f"{value:.{digits}g}"
+    return f"{value:.0f}" if "e+" in text else text
+
+
+def across(scale: Scale, line: Line) -> tuple[Array, Array, Array]:
+    """Return low end, line and high end as positions.
+
+    The band ends at the edge of the map; a line that is beyond it is NaN.
+    """
+    low, at, high = (scale.place(each) for each in (line.low, line.at, line.high))
+    return low, np.where(np.isfinite(line.at), at, np.nan), high
 
 
 # --- in print --------------------------------------------------------------------------------------------------------
@@ -181,9 +194,9 @@ def _draw(place: Axes, figure: MapFigure, chart: Chart) -> Any:
     place.grid(visible=False)
     if chart.line is not None:
         y = figure.y.position[list(chart.line.rows)]
-        left, at, right = (figure.x.place(each) for each in (chart.line.low, chart.line.at, chart.line.high))
+        left, at, right = across(figure.x, chart.line)
         place.fill_betweenx(y, left, right, color=_RED, alpha=0.3, linewidth=0.0)
-        place.plot(at, y, color=_RED, linewidth=1.4)
+        place.plot(at, y, "o-", color=_RED, linewidth=1.4, markersize=2.0)
     return colours
 
 
@@ -199,16 +212,16 @@ def spec(figure: MapFigure) -> Spec:
     """For plotly.js, by page.js."""
     down, across = len(figure.rows), len(figure.columns.values)
     layout: Spec = {"height": _CELL * down + _TITLE + _FOOT, "hovermode": "closest", "showlegend": False}
-    layout |= {"margin": {"l": 70, "r": 12, "t": _TITLE, "b": _FOOT}, "annotations": []}
+    left = _LABEL + _LETTER * max(len(written(value)) for value in figure.y.values)
+    layout |= {"margin": {"l": left, "r": 12, "t": _TITLE, "b": _FOOT}, "annotations": [_beside(figure.y.label, left)]}
     data: list[Spec] = []
     for number, (row, column) in enumerate(product(range(down), range(across)), 1):
         suffix = "" if number == 1 else str(number)
         place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
         x, y = _domain(column, across), _domain(down - 1 - row, down)
         last, first = row == down - 1, column == 0
-        middle = first and row == down // 2
-        layout[f"xaxis{suffix}"] = _axis(figure.x, ticks=last, title=last) | {"domain": x, "anchor": place["yaxis"]}
-        layout[f"yaxis{suffix}"] = _axis(figure.y, ticks=first, title=middle) | {"domain": y, "anchor": place["xaxis"]}
+        layout[f"xaxis{suffix}"] = _axis(figure.x, ticks=last, label=last) | {"domain": x, "anchor": place["yaxis"]}
+        layout[f"yaxis{suffix}"] = _axis(figure.y, ticks=first) | {"domain": y, "anchor": place["xaxis"]}
         layout["annotations"].append(_heading(figure, row, column, x[0], y[1]))
         chart = figure.charts[row][column]
         traces = [_heat(figure, chart.values, with_bar=number == 1), *_line(figure, chart.line)]
@@ -222,18 +235,24 @@ def _domain(index: int, count: int) -> list[float]:
     return [index * (width + gap), index * (width + gap) + width]
 
 
-def _axis(scale: Scale, *, ticks: bool, title: bool) -> Spec:
+def _axis(scale: Scale, *, ticks: bool, label: bool = False) -> Spec:
     places, shown = _places(scale), scale.ticks(_TICKS)
     more: dict[str, Any] = {"showticklabels": ticks, "showgrid": False, "zeroline": False, "ticks": ""}
     more |= {"tickvals": places[shown].tolist(), "ticktext": [written(scale.values[index]) for index in shown]}
     if scale.is_log:
         more["type"] = "log"
-    return axis(html.escape(scale.label) if title else "", **more)
+    return axis(html.escape(scale.label) if label else "", **more)
 
 
 def _places(scale: Scale) -> Array:
     """Where plotly.js, which takes the logarithm itself, has the cells."""
     return scale.position if scale.is_named else np.array(scale.values, dtype=np.float64)
+
+
+def _beside(label: str, left: int) -> Spec:
+    """Return the label of the y axis of all charts: one chart may be less high than it is long."""
+    place = {"x": 0.0, "y": 0.5, "xref": "paper", "yref": "paper", "xshift": 14 - left, "textangle": -90}
+    return {"text": html.escape(label), "showarrow": False, "font": {"size": 12}} | place
 
 
 def _heading(figure: MapFigure, row: int, column: int, x: float, y: float) -> Spec:
@@ -255,7 +274,7 @@ def _heat(figure: MapFigure, values: Array, *, with_bar: bool) -> Spec:
         "reversescale": not figure.more_is_better,
         "showscale": with_bar,
         "colorbar": {"title": {"text": html.escape(figure.label), "side": "right"}, "thickness": 10, "outlinewidth": 0},
-        "hovertemplate": "%{x:.3g}, %{y:.3g}: %{z:.3g}<extra></extra>",
+        "hovertemplate": "%{x:.4~g}, %{y:.4~g}: %{z:.4~g}<extra></extra>",
     }
 
 
@@ -264,12 +283,13 @@ def _line(figure: MapFigure, line: Line | None) -> list[Spec]:
     if line is None:
         return []
     y = _places(figure.y)[list(line.rows)].tolist()
-    low, at, high = ([figure.x.value(each) for each in figure.x.place(x)] for x in (line.low, line.at, line.high))
+    low, at, high = ([figure.x.value(each) for each in x] for x in across(figure.x, line))
     look = {"type": "scatter", "mode": "lines", "hoverinfo": "skip"}
+    shown = {"mode": "lines+markers", "marker": {"color": _RED, "size": 5}, "line": {"color": _RED, "width": 2.5}}
     around = {"x": [*low, *reversed(high)], "y": [*y, *reversed(y)]}
     return [
         look | around | {"fill": "toself", "fillcolor": "rgba(230,60,60,0.25)", "line": {"width": 0}},
-        look | {"x": at, "y": y, "line": {"color": _RED, "width": 2.5}},
+        look | shown | {"x": [None if math.isnan(each) else each for each in at], "y": y},
     ]
 
 
