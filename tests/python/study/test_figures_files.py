@@ -310,6 +310,7 @@ def test_every_colour_of_the_page_exists_in_both_themes(folder: Path) -> None:
 def test_text_is_set_in_type() -> None:
     assert in_html("m_p < 2 & a_21") == "m<sub>p</sub> &lt; 2 &amp; a<sub>21</sub>"
     assert in_mathtext("|θ/z̈| ẋ [N s/m], k_p") == r"|θ/$\ddot{z}$| $\dot{x}$ [N s/m], $k_{p}$"
+    assert in_mathtext(in_html("m_p < 2 & a_21")) == "$m_{p}$ < 2 & $a_{21}$"
     assert "<sub>" not in figures_page.build([figure_of("states")]).split("<body>")[0]
 
 

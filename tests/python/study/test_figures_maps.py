@@ -11,7 +11,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
-from lever_sil.study.figures import data, figures_page, maps, printed
+from lever_sil.study.figures import data, figures_page, maps, plotted, printed
 from lever_sil.study.figures.maps import Chart, Line, MapFigure, Scale
 from numpy.typing import NDArray
 from PIL import Image
@@ -80,7 +80,7 @@ def test_a_cell_has_the_colour_of_its_value_and_the_line_is_where_it_belongs() -
 
 
 def test_the_page_has_every_value_and_the_line_inside_the_map(tmp_path: Path) -> None:
-    spec = maps.spec(map_figure())
+    spec = plotted.map_spec(map_figure())
     heats = [trace for trace in spec["data"] if trace["type"] == "heatmap"]
     assert len(heats) == 8
     assert heats[2]["z"] == [[12.0, 22.0, 32.0], [42.0, 52.0, None]]
