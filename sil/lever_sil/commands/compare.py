@@ -74,6 +74,7 @@ _LIST = "lever compare --list"
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever compare`."""
     compare = subparsers.add_parser(
         "compare", help="compare all estimators on the same data", description=_DESCRIPTION, epilog=_EPILOG
     )

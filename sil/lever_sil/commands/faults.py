@@ -46,6 +46,7 @@ _SEEDS, _QUICK_SEEDS = 3, 1
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever faults`."""
     parser = subparsers.add_parser(
         "faults",
         help="test the firmware with faults of bus, senders and sensors",

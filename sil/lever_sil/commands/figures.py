@@ -49,6 +49,7 @@ examples:
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever figures`."""
     parser = subparsers.add_parser(
         "figures", help="draw the figures for print, from simulated runs", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -71,6 +72,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever figures`; return the exit status."""
     if not args.list:
         require("study")
 

@@ -27,6 +27,7 @@ _MOST_SEEDS = 1000
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever fmu pilot`."""
     parser = subparsers.add_parser(
         "pilot", help="a simulated pilot, lever, motor and cabin", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -47,6 +48,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever fmu pilot`; return the exit status."""
     from lever_cdkf.errors import LeverError
     from lever_cdkf.fmu import archive
 

@@ -89,6 +89,7 @@ _PRINT = ""  # --settings without a file
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parsers of `lever sim` and `lever demo`."""
     sim = subparsers.add_parser(
         "sim", help="simulate a scenario and judge the estimates", description=_DESCRIPTION, epilog=_EPILOG
     )

@@ -41,6 +41,7 @@ examples:
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever soak`."""
     parser = subparsers.add_parser(
         "soak", help="simulate a day of flights without a reset", description=_DESCRIPTION, epilog=_EPILOG
     )

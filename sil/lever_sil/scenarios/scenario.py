@@ -64,6 +64,7 @@ class FirmwareDither(excitation.Excitation):
     rms: float = quantity(SIGNAL, least=0.0)
 
     def scaled(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return zeros: the firmware makes this torque."""
         return np.zeros_like(time)
 
 
@@ -183,6 +184,7 @@ class Scenario:
 
     @cached_property
     def true_lever(self) -> lever_plant.Lever:
+        """The constants of the true lever: the settings, with the differences of [lever]."""
         return lever_plant.Lever.from_settings(self.config.settings | dict(self.lever or {}))
 
     def time(self) -> FloatArray:
