@@ -44,6 +44,7 @@ class Place:
         return Place(self.file, path, self.signal if signal is None else signal)
 
     def error(self, message: str) -> ScenarioError:
+        """Return an error that names file and key."""
         return ScenarioError(f"{self.file}: {self.path}: {message}" if self.path else f"{self.file}: {message}")
 
 

@@ -43,7 +43,7 @@ CONTENT: dict[str, Any] = {
     "mutants": {"valid": 10, "killed": 9, "equivalent": 1, "survivors": [MUTANT]},
     "eva": {"modules": [{"harness": "e2e", "files": ["can/e2e.c"], "alarms": 0, "reached": 100}]},
     "eva_alarms": 0,
-    "soak": {"total": {"hour": "all", "NEES [1]": 0.98}, "hours": 24, "memory_growth_mib": 0.1, "troubles": []},
+    "soak": {"total": {"hour": "all", "NEES": 0.98}, "hours": 24, "memory_growth_mib": 0.1, "troubles": []},
     "fuzz": {"targets": ["slcan"], "seconds": 60, "seeds": {"slcan": 4711}, "found": 0},
     "seconds": {"eva": 11.0},
     "provenance": {"version": "1", "revision": "abc", "created": "today", "library": "sha256:0"},

@@ -84,9 +84,13 @@ class AcceptanceCondition(Protocol):
     """A row of the table."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The name on the command line."""
+
     @property
-    def title(self) -> str: ...
+    def title(self) -> str:
+        """What is flown, in words."""
+
     @property
     def limits(self) -> tuple[Limit, ...]:
         """All must hold; without any the row is reported only."""

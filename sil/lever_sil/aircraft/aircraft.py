@@ -189,6 +189,7 @@ class FromFile(Aircraft):
     """The airframe, once the file has been read."""
 
     def mounted(self) -> StateSpace:
+        """Return the airframe that the file holds, from pitch and gust to seat and accelerometer."""
         assert self.system is not None
         return self.system
 
@@ -209,6 +210,7 @@ class Imported(FromFile):
 
     @property
     def has_actuator(self) -> bool:
+        """Whether the response is that to the blade, so that the actuator comes on top."""
         return self.input == "blade"
 
     def picked(self, whole_system: StateSpace, where: str) -> StateSpace:
@@ -250,6 +252,7 @@ class Fitted(FromFile):
 
     @property
     def has_actuator(self) -> bool:
+        """Always false: the measured response contains the actuator."""
         return False
 
 

@@ -101,6 +101,7 @@ class Constants:
 
     @classmethod
     def of(cls, aircraft: Aircraft, period: float) -> Constants:
+        """Return the constants of an aircraft for a sample period [s], discretised by first-order hold."""
         substeps = math.ceil(period / LONGEST_SUBSTEP - 1e-6)
         step = period / substeps
         airframe, lag = aircraft.airframe(), math.exp(-step * 2.0 * math.pi * aircraft.actuator_bandwidth)

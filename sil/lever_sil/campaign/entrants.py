@@ -68,9 +68,11 @@ class Firmware(Entrant):
         self.name, self.title = name, f"firmware, {name}"
 
     def unfit(self, scenario: Scenario) -> str:
+        """Return "": the firmware can be run on all flights."""
         return ""
 
     def track(self, flights: Sequence[Flight]) -> Track:
+        """Return the firmware's own estimates, in flight or replayed afterwards."""
         columns = [self._run(flight) for flight in flights]
         merged = {name: np.stack([each[name] for each in columns]).astype(np.float64) for name in _TAKEN}
         dynamics = ("natural_frequency", "damping_ratio")
@@ -91,6 +93,7 @@ class Firmware(Entrant):
         return columns | {"flagged": is_flagged(columns["faults"], DO_NOT_TRUST).astype(np.float64)}
 
     def flies_in(self, scenario: Scenario) -> bool:
+        """Return whether the scenario has this estimator in the loop."""
         return scenario.config.choices["estimator"] == self.name
 
     def _replayed(self, flight: Flight) -> Columns:
@@ -115,6 +118,7 @@ class Published(Entrant):
         self.cost = cost
 
     def unfit(self, scenario: Scenario) -> str:
+        """Return why the baseline cannot be run: its model, the preload, or dropouts; empty if it can."""
         kind = KINDS.get(scenario.config.choices["model"])
         if kind is None:
             return f"has no model {scenario.config.choices['model']!r}"
@@ -125,6 +129,7 @@ class Published(Entrant):
         return "needs every sample, and this scenario has dropouts" if scenario.sensors.dropout else ""
 
     def track(self, flights: Sequence[Flight]) -> Track:
+        """Return the baseline's estimates from the detrended measurements of all flights at once."""
         batch = _batch(flights)
         with np.errstate(all="ignore"):  # of runs that break down
             estimates = BASELINES[self.name].run(batch, flights[0].at)
@@ -168,6 +173,7 @@ ENTRANTS: Mapping[str, Entrant] = {
         Published("joint_ekf", 0.03),
         Published("joint_ukf", 0.05),
         Published("rls", 0.05),
+        Published("rls_regularised", 0.05),
         Published("lms", 0.05),
     )
 }

@@ -40,7 +40,7 @@ _QUANTITIES = (
         more_is_better=True,
     ),
     _Quantity(
-        "nees", "NEES", "NEES [1]", statistics.nees, 1.0, (0.0, 12.0),
+        "nees", "NEES", "NEES (expected 3)", statistics.nees, 1.0, (0.0, 12.0),
         "Normalised squared error of the three parameters: 3 is right, more is over-confident.",
     ),
     _Quantity(
@@ -53,7 +53,7 @@ _QUANTITIES = (
     ),
 )  # fmt: skip
 
-_LINE = "Line: the border where tracking fails, with its 95 % band."
+_LINE = "Line: the border where tracking fails, with its 95 % band; none where it lies beyond the map."
 
 
 def figures(cells: Map, borders: Sequence[Border]) -> list[MapFigure]:

@@ -9,7 +9,7 @@ from lever_cdkf.cli.tables import Row
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import rows_table
 
-from ..study.figures import maps as drawn
+from ..study.figures import plotted
 from ..study.figures.maps import MapFigure
 from . import cells as statistics
 from .cells import Map
@@ -24,10 +24,10 @@ def build(
     spec, length = plan.spec, f"{60.0 * plan.minutes:g}"
     page = Page(spec.title, f"{html.escape(spec.description)} {spec.runs:,} runs of {length} s.", "lever campaign")
     for figure in figures:
-        chart = page.figure(f"{figure.name}-chart", drawn.spec(figure), html.escape(figure.caption))
+        chart = page.figure(f"{figure.name}-chart", plotted.map_spec(figure), html.escape(figure.caption))
         page.section(figure.name, figure.title, figure.title, chart)
     page.section("border", "Border", "Where tracking fails", rows_table(border))
-    page.section("estimators", "Estimators", "All runs of each estimator", rows_table(by_estimator))
+    page.section("estimators", "Estimators", "All runs of each estimator: median rms errors", rows_table(by_estimator))
     return page.html(f'<p class="verdict">{_verdict(cells, spec.failure)}</p>')
 
 

@@ -14,7 +14,7 @@ from lever_cdkf.runtime.files import write_text
 from lever_cdkf.runtime.provenance import Provenance, with_provenance
 
 from ..study.figures import printed
-from ..study.figures.maps import MapFigure
+from ..study.figures.maps import MapFigure, written
 from . import map_figures, map_page, spec
 from .border import Border, borders
 from .cells import Map, read
@@ -58,10 +58,10 @@ def rows(cells: Map, edge: Sequence[Border]) -> list[Row]:
         row: dict[str, str | float | None] = {"estimator": each.estimator}
         for scale, index in ((cells.panels, each.panel), (cells.y, each.y)):
             if scale.label:
-                row[scale.label] = _text(scale.values[index])
+                row[scale.label] = written(scale.values[index], 3)
         row[f"fails from {cells.x.label}"] = _beyond(cells, each.at)
         row["95 % band"] = f"{_beyond(cells, each.low)} to {_beyond(cells, each.high)}"
-        row["by"] = each.cause
+        row["fails by"] = each.cause
         shown.append(row)
     return shown
 
@@ -69,12 +69,8 @@ def rows(cells: Map, edge: Sequence[Border]) -> list[Row]:
 def _beyond(cells: Map, value: float) -> str:
     ends = [float(each) for each in (cells.x.values[0], cells.x.values[-1])]
     if math.isfinite(value):
-        return f"{value:.3g}"
-    return f"> {ends[1]:.3g}" if value > 0.0 else f"< {ends[0]:.3g}"
-
-
-def _text(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.3g}"
+        return written(value, 3)
+    return f"> {written(ends[1], 3)}" if value > 0.0 else f"< {written(ends[0], 3)}"
 
 
 def _csv(cells: Map, edge: Sequence[Border]) -> str:

@@ -99,7 +99,7 @@ def by_estimator(plan: Plan, folder: Path) -> list[Row]:
             "failed": of_one.num_rows - of_one["error"].null_count,
         }
         for each in names:
-            row[f"{each} [%]"] = _percent(np.nanmedian, of_one[f"rms_{each}"])
+            row[f"{each} rms [%]"] = _percent(np.nanmedian, of_one[f"rms_{each}"])
         covered = [_percent(np.nanmean, of_one[f"coverage_{each}"]) for each in names]
         row["least coverage [%]"] = min((value for value in covered if value is not None), default=None)
         shown.append(row)

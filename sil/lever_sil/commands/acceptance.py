@@ -74,8 +74,7 @@ class AcceptanceCommand(ABC, Generic[Row]):
             "--out",
             metavar="DIR",
             type=Path,
-            default=Path(f"lever_{self.name}"),
-            help=f"folder for the page, {self.name}.html (default: %(default)s)",
+            help=f"folder for the page, {self.name}.html (default: no files)",
         )
         parser.add_argument(
             "--json", metavar="FILE", help='also write the rows to FILE: {"rows": [{"name", "measured", …}], …}'
@@ -96,13 +95,14 @@ class AcceptanceCommand(ABC, Generic[Row]):
             }
             print_tables(listed, args.json)
             return 0
-        require("report")
         chosen = self._chosen(args)
         seeds = args.seeds if args.seeds is not None else self.quick_seeds if args.quick else self.seeds
         if not 1 <= seeds <= 1000:
             raise LeverError(f"--seeds {seeds}: must be from 1 to 1000")
-        make_folder(args.out)  # before a campaign that could then not be kept
-        check_writable(args.out / f"{self.name}.html")
+        if args.out is not None:  # before a campaign that could then not be kept
+            require("report")
+            make_folder(args.out)
+            check_writable(args.out / f"{self.name}.html")
         with Progress(self.name) as progress:
             results = self.measure(chosen, seeds, progress.show)
         each = self.each if seeds > 1 else self.each.replace("pilots", "pilot")
@@ -122,13 +122,15 @@ class AcceptanceCommand(ABC, Generic[Row]):
 
         from ..acceptance import table
 
-        origin = provenance()
-        files = {args.out / f"{self.name}.html": with_provenance(self.page(results, seeds), origin)}
+        origin, files = provenance(), {}
+        if args.out is not None:
+            files[args.out / f"{self.name}.html"] = with_provenance(self.page(results, seeds), origin)
         if args.json is not None:
             content = {"rows": table.rows(results), "provenance": asdict(origin)}
             files[Path(args.json)] = json_text(content)
         write_texts(files)
-        say(f"Written to {args.out}: {self.name}.html")
+        if args.out is not None:
+            say(f"Written to {args.out}: {self.name}.html")
 
     def _chosen(self, args: argparse.Namespace) -> list[Row]:
         """Return the conditions that were asked for. Raise LeverError for one that is not known."""

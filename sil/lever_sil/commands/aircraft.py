@@ -49,6 +49,7 @@ _SAID = {"gain_sigma": "1", "phase_sigma": "rad", "warning": "dB", "alarm": "dB"
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever aircraft`."""
     parser = subparsers.add_parser(
         "aircraft",
         help="the response of a helicopter, for the margin to bounce",
@@ -67,6 +68,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever aircraft`; return the exit status."""
     from lever_cdkf.cli.tables import print_tables
     from lever_cdkf.errors import LeverError
     from lever_cdkf.runtime.files import write_text

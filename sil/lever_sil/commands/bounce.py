@@ -21,7 +21,7 @@ cushion, delays, friction and a slow actuator leave of that (the conditions that
 
 The firmware knows the aircraft by a table of its response, which is off by 5 % and 0.05 rad (standard deviations, which
 it is given). "all runs" pools the flights (sum, mean, rms or worst, as `--list` and the page say); a limit applies to
-that unless it says median or worst. The page that is written has a chart and all figures of each condition.
+that unless it says median or worst. The page of -o has a chart and all figures of each condition.
 
 Exit status: 0 when all conditions hold, 1 when one misses, 2 when the command line is wrong.
 """
@@ -30,7 +30,7 @@ examples:
   lever bounce --list
   lever bounce --quick                            some conditions, three pilots an aircraft
   lever bounce --only alarm margin --seeds 50
-  lever bounce --json bounce.json                 all conditions, 20 pilots an aircraft
+  lever bounce -o out/bounce                      all conditions, 20 pilots an aircraft
 """
 
 

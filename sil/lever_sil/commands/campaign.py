@@ -50,6 +50,7 @@ Workers at a scheduler need the same lever-cdkf installed, and DIR on a file sys
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever campaign`."""
     campaign = subparsers.add_parser(
         "campaign",
         help="run a scenario over a design of its values, on many cores",

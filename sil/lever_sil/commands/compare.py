@@ -14,7 +14,7 @@ from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
 from lever_cdkf.runtime.files import make_folder
 
-from .names import check_names
+from .names import check_names, seed
 
 if TYPE_CHECKING:
     from ..study.compare.cases import Plan
@@ -74,6 +74,7 @@ _LIST = "lever compare --list"
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever compare`."""
     compare = subparsers.add_parser(
         "compare", help="compare all estimators on the same data", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -93,7 +94,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     compare.add_argument("--models", nargs="+", metavar="MODEL", help="only cases of these models (default: all)")
     compare.add_argument("--estimators", nargs="+", metavar="NAME", help="estimators of --list (default: all)")
     compare.add_argument("--seeds", type=int, metavar="N", help=f"runs of each case (default: {_SEEDS})")
-    compare.add_argument("--seed", type=int, metavar="N", help=f"seed of the first (default: {_SEED})")
+    compare.add_argument("--seed", type=seed, metavar="N", help=f"seed of the first (default: {_SEED})")
     compare.add_argument("--duration", type=float, metavar="SECONDS", help="of each run (default: each case's own)")
     compare.add_argument(
         "--quick", action="store_true", help=f"a few cases, {_QUICK_SEEDS} runs of {_QUICK_DURATION:g} s: a preview"

@@ -21,8 +21,8 @@ default settings.
 A condition holds when the natural frequency (f_n), damping ratio (zeta) and parameters are right within the limit, when
 the stated ±2σ covers the truth as often as the limit asks, or, where the limit says so, when the firmware flags that
 it is not to be trusted. "all runs" pools them (rms of errors, mean of shares, the longest time); a limit
-applies to that unless it says median, p90 (nine of ten runs are no worse) or worst. The page that is written has a
-chart and all figures of each condition.
+applies to that unless it says median, p90 (nine of ten runs are no worse) or worst. The page of -o has a chart and
+all figures of each condition.
 
 The second table of --list, "rules", measures what the firmware takes for a change of the pilot, a fault or rough air,
 and how soon. Its limits are aims, and some are missed. It runs only where --only names it.
@@ -34,7 +34,7 @@ examples:
   lever envelope --list
   lever envelope --quick                          some conditions, three pilots each: ten seconds
   lever envelope --only retrim base_stuck --seeds 50
-  lever envelope --json envelope.json             all conditions, 20 pilots each: a minute on two cores
+  lever envelope -o out/envelope                  all conditions, 20 pilots each: a minute on two cores
   lever envelope --only rules --seeds 40          when changes, faults and rough air are noticed: some minutes
 """
 

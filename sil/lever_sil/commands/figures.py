@@ -8,7 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lever_cdkf.cli.layout import say
+from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
+
+from .names import seed
 
 _PAGE, _CAPTIONS, _PROVENANCE = "figures.html", "captions.md", "provenance.json"
 
@@ -38,25 +41,19 @@ The same seed gives the same figures and the same numbers.
 _EPILOG = """\
 examples:
   lever figures --list
-  lever figures --out out/figures
-  lever figures --only bode grip --seed 7
-  lever figures --campaign out/quick                       beside the maps of this campaign
-  lever figures --paper --out out/paper                    the five figures of the paper, by their numbers
+  lever figures -o out/figures
+  lever figures -o out/figures --only bode grip --seed 7
+  lever figures -o out/figures --campaign out/quick        beside the maps of this campaign
+  lever figures -o out/paper --paper                       the five figures of the paper, by their numbers
 """
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever figures`."""
     parser = subparsers.add_parser(
         "figures", help="draw the figures for print, from simulated runs", description=_DESCRIPTION, epilog=_EPILOG
     )
-    parser.add_argument(
-        "-o",
-        "--out",
-        metavar="DIR",
-        type=Path,
-        default=Path("lever_figures"),
-        help="folder for the files (default: %(default)s)",
-    )
+    parser.add_argument("-o", "--out", metavar="DIR", type=Path, help="folder for the files")
     parser.add_argument("--seed", type=seed, default=1, help="of all random numbers (default: %(default)s)")
     parser.add_argument(
         "--only", metavar="NAME", nargs="+", action="extend", default=[], help="these figures, and a page of them"
@@ -74,15 +71,8 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("--list", action="store_true", help="print the names of all figures")
 
 
-def seed(text: str) -> int:
-    """Return a seed from the command line."""
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"{value} is negative")
-    return value
-
-
 def run(args: argparse.Namespace) -> int:
+    """Run `lever figures`; return the exit status."""
     if not args.list:
         require("study")
 
@@ -90,6 +80,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.list:
         return _list()
+    if args.out is None:
+        raise LeverError("-o DIR is missing: the folder for the files")
     figures = _figures(args)
     written = _make({name: figures[name] for name in chosen(args.only, list(figures))}, args)
     say(f"Written to {args.out}: {', '.join(written)}")

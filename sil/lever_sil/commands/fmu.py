@@ -7,6 +7,8 @@ from typing import Any
 
 from lever_cdkf.fmu.options import add_out_option, print_written
 
+from .names import seed
+
 _DESCRIPTION = """\
 Makes an FMU of a simulated pilot with lever, motor, sensors and cabin, as `lever sim` has them, so that a controller
 can be tested against it. Outputs are what the sensors say, and the truth; inputs are the motor's torque and the
@@ -25,6 +27,7 @@ _MOST_SEEDS = 1000
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever fmu pilot`."""
     parser = subparsers.add_parser(
         "pilot", help="a simulated pilot, lever, motor and cabin", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -35,7 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="set a value of the scenario; may be repeated"
     )
-    parser.add_argument("--seed", type=int, help="the seed, or the first of --seeds (default: the scenario's)")
+    parser.add_argument("--seed", type=seed, help="the seed, or the first of --seeds (default: the scenario's)")
     parser.add_argument("--seeds", type=int, metavar="N", default=1, help="so many consecutive seeds (default: 1)")
     parser.add_argument(
         "--aircraft",
@@ -45,6 +48,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever fmu pilot`; return the exit status."""
     from lever_cdkf.errors import LeverError
     from lever_cdkf.fmu import archive
 

@@ -1,11 +1,20 @@
-"""Names on a command line that must be among those that are known."""
+"""Names and seeds on a command line."""
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterable, Sequence
 
 from lever_cdkf.errors import LeverError
 from lever_cdkf.text.suggestions import did_you_mean
+
+
+def seed(text: str) -> int:
+    """Return a seed, for the type of an argument. Raise ArgumentTypeError."""
+    value = int(text)
+    if not 0 <= value < 1 << 63:
+        raise argparse.ArgumentTypeError(f"{value} is not from 0 to {(1 << 63) - 1}")
+    return value
 
 
 def check_names(what: str, names: Iterable[str], among: Iterable[str], listed_by: str) -> None:

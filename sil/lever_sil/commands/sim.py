@@ -18,6 +18,8 @@ from lever_cdkf.cli.tables import Row, Tables, add_json_option
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
 
+from .names import seed
+
 if TYPE_CHECKING:
     import can
     from lever_cdkf.report.page import Story
@@ -36,6 +38,9 @@ before the next one is sent. Prints how good the estimates were; with --out also
   trace.parquet  with --format parquet: trace.csv with units, for pandas, polars and the like
   summary.json   errors, coverage, times to converge, innovations, counts, a verdict, and where the files come from
   report.html    all of it as one page for a browser
+
+Errors are relative to the truth, from converged_after on. "below 10 % after" is the time from the start, and from each
+jump of the truth, until the error stays below 10 %.
 
 With --seeds N it runs the scenario N times, each time with other random numbers, in as many processes as there are
 cores, and prints median and worst over the runs: a single run is one draw of noise and vibration. Its only file is
@@ -84,6 +89,7 @@ _PRINT = ""  # --settings without a file
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parsers of `lever sim` and `lever demo`."""
     sim = subparsers.add_parser(
         "sim", help="simulate a scenario and judge the estimates", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -95,7 +101,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     sim.add_argument(
         "--set", metavar="KEY=VALUE", action="append", default=[], help="set a value of the scenario; may be repeated"
     )
-    sim.add_argument("--seed", type=int, help="set the seed of all random numbers; with --seeds the first (default: 1)")
+    sim.add_argument("--seed", type=seed, help="seed of all random numbers; with --seeds the first (default: 1)")
     sim.add_argument("--seeds", type=int, metavar="N", help="run N times, with consecutive seeds: median and worst")
     sim.add_argument("--jobs", type=int, metavar="N", help="with --seeds: processes (default: one a core)")
     sim.add_argument(
@@ -303,8 +309,8 @@ def _tables(result: SimulationResult) -> Tables:
                 "rms error [%]": entry.rms_percent if entry else None,
                 "bias [%]": entry.bias_percent if entry else None,
                 "truth within 2 sigma [1]": entry.coverage_2sigma if entry else None,
-                "time to 10 % [s]": _times(entry.time_to_10_percent_s if entry else ()),
-                "time to 5 % [s]": _times(entry.time_to_5_percent_s if entry else ()),
+                "below 10 % after [s]": _times(entry.time_to_10_percent_s if entry else ()),
+                "below 5 % after [s]": _times(entry.time_to_5_percent_s if entry else ()),
             }
         )
     run_row: Row = {

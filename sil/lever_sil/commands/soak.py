@@ -14,6 +14,8 @@ from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
 from lever_cdkf.runtime.files import check_writable, json_text, write_texts
 
+from .names import seed
+
 if TYPE_CHECKING:
     from ..soak.soak import SoakResult
 
@@ -39,13 +41,16 @@ examples:
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever soak`."""
     parser = subparsers.add_parser(
         "soak", help="simulate a day of flights without a reset", description=_DESCRIPTION, epilog=_EPILOG
     )
-    parser.add_argument("--hours", type=float, default=24.0, metavar="H", help="simulated (default: 24)")
-    parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default: 1)")
+    parser.add_argument(
+        "--hours", type=float, default=24.0, metavar="H", help="rounded to whole flights of 5 minutes (default: 24)"
+    )
+    parser.add_argument("--seed", type=seed, default=1, help="of all random numbers (default: 1)")
     parser.add_argument("-o", "--out", metavar="FILE", help="also write a page with charts over the hours")
-    parser.add_argument("--json", metavar="FILE", help='also write the hours to FILE: {"hours": [{"NEES [1]", …}], …}')
+    parser.add_argument("--json", metavar="FILE", help='also write the hours to FILE: {"hours": [{"hour", …}], …}')
     parser.set_defaults(run=run)
 
 
@@ -88,7 +93,8 @@ def run(args: argparse.Namespace) -> int:
 def _verdict(result: SoakResult) -> str:
     total, faults = result.total, sum(result.faults.values())
     return (
-        f"{total.seconds / 3600.0:.2f} h flown with {faults} faults: NEES {total.row()['NEES [1]']:.2f} (expected 1), "
+        f"{total.row()['flights']} flights of 5 min with {faults} faults: NEES "
+        f"{total.row()['NEES (expected 1)']:.2f} (expected 1), "
         f"silent errors for {total.silent_s:.0f} s, {total.counts['recoveries']} restarts of the filter, memory "
         f"{result.growth:+.1f} MiB."
     )

@@ -17,10 +17,12 @@ _PARAMETERS = ("m_p", "c_p", "k_p")
 
 
 def most(figure: str, value: float, over: str = "all") -> Limit:
+    """Return an upper limit of a figure, in the unit of the figure."""
     return Limit(figure, most=value, over=over)
 
 
 def least(figure: str, value: float) -> Limit:
+    """Return a lower limit of a figure over all runs, in the unit of the figure."""
     return Limit(figure, least=value)
 
 

@@ -139,6 +139,8 @@ def flipped(message: str, byte: int) -> Fault:
 
 
 def wrong_crc(message: str) -> Fault:
+    """Return the fault that inverts the CRC byte of every frame of a message."""
+
     def spoil(bus: Bus, time: Interval) -> None:
         bus.frames["change"][bus.sent(message, time), 0] ^= 0xFF
 

@@ -13,7 +13,7 @@ from ..measures import WRONG
 from .judge import BACK, ERROR, RIGHT, SILENT
 from .matrix import RowResult
 from .rows import KNOWN
-from .table import HOLDS, demands, lines, missed, state
+from .table import HOLDS, demands, lines, missed, state, unexpected
 
 _FEW = 12
 """Of so few faults all have a chart."""
@@ -47,7 +47,8 @@ def _verdict(results: Sequence[RowResult]) -> str:
     met = f"{len(results) - len(broken)} of {len(results)} faults are met as demanded"
     wrong = f"in {silent} an estimate is wrong for {SILENT:g} s or more without a flag"
     named = f" Not met: {links}." if broken else ""
-    return f'<p class="verdict {"bad" if broken else "good"}">{met}; {wrong}.{named}</p>'
+    mood = "bad" if unexpected(results) else "watch" if broken else "good"
+    return f'<p class="verdict {mood}">{met}; {wrong}.{named}</p>'
 
 
 def _table(results: Sequence[RowResult]) -> str:

@@ -12,12 +12,14 @@ from . import judge
 from .matrix import RowResult
 from .rows import KNOWN
 
-HOLDS, MISSED, SILENT = "holds", "MISSED", "SILENT"
+HOLDS, KNOWN_MISSED, MISSED, SILENT = "holds", "known", "MISSED", "SILENT"
 _WORD = {"silent": "wrong without a flag", "right": "too rarely right"}
 
 
 def state(result: RowResult) -> str:
-    """In a word."""
+    """Return the result in a word; of a known limitation it is "known"."""
+    if result.broken and result.row.name in KNOWN:
+        return KNOWN_MISSED
     if result.silent:
         return SILENT
     return MISSED if result.broken else HOLDS

@@ -55,6 +55,7 @@ class Normalised(Excitation):
     rms: float = quantity(SIGNAL, least=0.0)
 
     def scaled(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return the waveform inside its window, scaled so that its rms is exactly `rms`."""
         wave = self.waveform(time, rng)
         power = float(np.mean(np.square(wave)))
         return wave * (self.rms / math.sqrt(power)) if power > 0.0 else wave
@@ -72,6 +73,7 @@ class Sine(Normalised):
     phase: float = quantity("rad", 0.0)
 
     def waveform(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return a sine of `frequency` [Hz] and `phase` [rad]."""
         return np.sin(2.0 * math.pi * self.frequency * time + self.phase)
 
 
@@ -83,6 +85,7 @@ class Band(Normalised):
     high: float = quantity("Hz", above=0.0)
 
     def check(self) -> None:
+        """Raise ValueError unless `low` is below `high`."""
         if not self.low < self.high:
             raise ValueError(f"low {self.low:g} Hz is not below high {self.high:g} Hz")
 
@@ -98,6 +101,7 @@ class Multisine(Band):
     lines: int = whole(10, least=2, greatest=1000)
 
     def waveform(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return cosines evenly spaced in frequency, with Schroeder's phases for a low crest factor."""
         number = np.arange(1, self.lines + 1)
         phase = -math.pi * number * (number - 1) / self.lines
         wave = np.zeros_like(time)
@@ -113,6 +117,7 @@ class Chirp(Band):
     sweep: float = quantity("s", above=0.0)
 
     def waveform(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return a sine whose frequency sweeps up and down exponentially, `sweep` [s] each way."""
         turns = time / self.sweep
         rise = 1.0 - np.abs(1.0 - np.mod(turns, 2.0))
         frequency = self.low * (self.high / self.low) ** rise
@@ -126,6 +131,7 @@ class Noise(Band):
     """Gaussian noise, white from `low` to `high` and exactly nothing outside."""
 
     def waveform(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return Gaussian noise with a flat spectrum from `low` to `high` [Hz]."""
         if len(time) < 2:
             return np.zeros_like(time)
         frequency = np.fft.rfftfreq(len(time), float(time[1] - time[0]))
@@ -143,6 +149,7 @@ class GaussMarkov(Normalised):
     correlation_time: float = quantity("s", above=0.0)
 
     def waveform(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return a stationary first-order Gauss-Markov process of unit variance."""
         step = float(time[1] - time[0]) if len(time) > 1 else 0.0
         left = math.exp(-step / self.correlation_time)
         white = math.sqrt(1.0 - left * left) * rng.standard_normal(len(time))
@@ -158,6 +165,7 @@ class Rotor(Normalised):
     harmonics: tuple[int, ...] = wholes(1, 64)
 
     def waveform(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return the harmonics of the rotor with equal amplitudes and random phases."""
         wave = np.zeros_like(time)
         for harmonic, phase in zip(self.harmonics, rng.uniform(0.0, 2.0 * math.pi, len(self.harmonics)), strict=True):
             wave += np.sin(2.0 * math.pi * harmonic * self.rotor_frequency * time + phase)
@@ -173,10 +181,12 @@ class Pulses(Excitation):
     period: float = quantity("s", above=0.0)
 
     def check(self) -> None:
+        """Raise ValueError when a pulse is longer than the period."""
         if self.width > self.period:
             raise ValueError(f"width {self.width:g} s is longer than period {self.period:g} s")
 
     def scaled(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return pulses of `amplitude`, one a period, with alternating signs."""
         step = float(time[1] - time[0]) if len(time) > 1 else 1.0
         sample = np.arange(len(time))
         period, width = max(1, round(self.period / step)), round(self.width / step)

@@ -74,6 +74,7 @@ class Hysteretic(Truth):
 
     @property
     def parameters(self) -> Mapping[str, FloatArray]:
+        """m_p [kg] and k_p [N/m] at 4 Hz; the loss factor is constant."""
         return {"m_p": self.m_p, "k_p": self.k_p}
 
     @property
@@ -84,10 +85,12 @@ class Hysteretic(Truth):
 
     @property
     def rest(self) -> FloatArray:
+        """The trim angle [rad]."""
         return self.trim
 
     @property
     def dynamics(self) -> Dynamics:
+        """Natural frequency [Hz] and damping ratio of the dominant mode."""
         return dominant_dynamics(self, self.m_p, self.k_p, self.trim)
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
@@ -103,6 +106,7 @@ class Hysteretic(Truth):
         return Transfer(alone.numerator * every, denominator)
 
     def body(self, conditions: Conditions) -> HystereticPlant:
+        """Return the lever at the first sample, at rest at its trim angle."""
         return HystereticPlant(self, conditions)
 
 

@@ -171,20 +171,24 @@ class LeverTruth(truths.Truth):
 
     @property
     def parameters(self) -> Mapping[str, FloatArray]:
+        """m_p [kg], c_p [N s/m] and k_p [N/m]; NaN while nobody holds the lever."""
         return {name: np.where(self._held, getattr(self.pilot, name), np.nan) for name in ("m_p", "c_p", "k_p")}
 
     @property
     def rest(self) -> FloatArray:
+        """The trim angle, or with fixed preload the angle at which springs and weight balance [rad]."""
         return equilibrium(self.lever, self.pilot, self.preload)
 
     @property
     def dynamics(self) -> Dynamics:
+        """Natural frequency [Hz] and damping ratio about the rest angle; NaN while nobody holds the lever."""
         pilot_dynamics = dynamics(self.lever, self._pilot(self._held), self.preload)
         columns = np.full((2, len(self._held)), np.nan)
         columns[:, self._held] = pilot_dynamics.natural_frequency, pilot_dynamics.damping_ratio
         return Dynamics(*columns)
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
+        """Return theta/z_ddot of lever and arm, linearised about the rest angle."""
         pilot = self._pilot(samples)
         angle = equilibrium(self.lever, pilot, self.preload)
         spring = stiffness(self.lever, pilot, self.preload, angle)
@@ -201,6 +205,7 @@ class LeverTruth(truths.Truth):
         return Truth(*(column[samples] for column in vars(self.pilot).values()))
 
     def body(self, conditions: Conditions) -> LeverPlant:
+        """Return the nonlinear lever and arm at the first sample."""
         return LeverPlant(self.lever, self.pilot, self.preload, conditions)
 
 

@@ -53,19 +53,23 @@ class LinearTruth(Truth):
 
     @property
     def rest(self) -> FloatArray:
+        """The rest angle of the system [rad]."""
         return self.system.rest
 
     @property
     def dynamics(self) -> Dynamics:
+        """Natural frequency [Hz] and damping ratio of the second-order system."""
         omega = np.sqrt(self.system.stiffness)
         return Dynamics(omega / (2.0 * np.pi), self.system.damping / (2.0 * omega))
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
+        """Return theta/z_ddot: the gain over the monic second-order denominator."""
         system = self.system
         denominator = (np.ones_like(system.damping), system.damping, system.stiffness)
         return Transfer(system.gain[samples, None], np.stack(denominator, axis=1)[samples])
 
     def body(self, conditions: Conditions) -> LinearPlant:
+        """Return the linear system at the first sample."""
         return LinearPlant(self.system, self.felt(conditions))
 
     def felt(self, conditions: Conditions) -> Conditions:
@@ -85,10 +89,12 @@ class Physical(LinearTruth):
 
     @property
     def parameters(self) -> Mapping[str, FloatArray]:
+        """m, c and k of the mass on spring and damper, in SI units."""
         return {"m": self.m, "c": self.c, "k": self.k}
 
     @property
     def system(self) -> System:
+        """Coefficients of a mass on spring and damper, driven by base and force."""
         return System(self.k / self.m, self.c / self.m, np.ones_like(self.m), 1.0 / self.m, self.trim)
 
 
@@ -105,10 +111,12 @@ class BlackBox(LinearTruth):
 
     @property
     def parameters(self) -> Mapping[str, FloatArray]:
+        """a21 [1/s²], a22 [1/s] and b21 [1]."""
         return {"a21": self.a21, "a22": self.a22, "b21": self.b21}
 
     @property
     def system(self) -> System:
+        """Coefficients of the black box, on which no force acts."""
         return System(-self.a21, -self.a22, self.b21, np.zeros_like(self.b21), self.trim)
 
 

@@ -68,11 +68,13 @@ class Mayo(LinearTruth):
 
     @property
     def parameters(self) -> Mapping[str, FloatArray]:
+        """k_hand [1/s²], c_hand [1/s] and c_space [1/s], constant over the run."""
         hand, ones = self.hand, np.ones_like(self.trim)
         return {"k_hand": hand.stiffness * ones, "c_hand": hand.damping * ones, "c_space": hand.outside * ones}
 
     @property
     def system(self) -> System:
+        """Coefficients of the hand's motion relative to the cabin, as an angle of the lever."""
         ones = np.ones_like(self.trim)
         gain = -1.0 / (self.length * np.cos(self.trim))
         return System(self.hand.stiffness * ones, self.hand.damping * ones, gain, 0.0 * ones, self.trim)
@@ -91,6 +93,7 @@ class Mayo(LinearTruth):
         return dataclasses.replace(conditions, z_ddot=z_ddot + self.hand.outside * z_dot)
 
     def body(self, conditions: Conditions) -> LinearPlant:
+        """Return the linear system at the first sample, which feels the cabin's velocity, too."""
         return LinearPlant(self.system, _InSpace(**vars(conditions), outside=self.hand.outside))
 
 

@@ -111,6 +111,7 @@ class LeverPilot(ArmPilot):
             raise ValueError("'hands_off' goes with preload trim; with fixed preload the lever would fall")
 
     def changes(self) -> set[float]:
+        """Return times [s] of jumps, including those at which the hands leave and take the lever."""
         return super().changes() | {time for off in self.hands_off for time in (off.start, off.end)}
 
     def build(
@@ -141,6 +142,7 @@ class PhysicalPilot(Pilot):
     def build(
         self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
     ) -> Truth:
+        """Return a mass on spring and damper."""
         return linear_plant.Physical(**values, trim=trim)
 
 
@@ -158,6 +160,7 @@ class BlackBoxPilot(Pilot):
     def build(
         self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
     ) -> Truth:
+        """Return a black box of second order."""
         return linear_plant.BlackBox(**values, trim=trim)
 
 
@@ -177,6 +180,7 @@ class TwoDofPilot(ArmPilot):
     def build(
         self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
     ) -> Truth:
+        """Return a lever whose pilot's trunk moves on the seat."""
         return two_dof_plant.TwoDof(lever, **values, trim=trim)
 
 
@@ -199,6 +203,7 @@ class HystereticPilot(Pilot):
     def build(
         self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
     ) -> Truth:
+        """Return a lever whose arm has hysteretic damping."""
         return hysteretic_plant.Hysteretic(lever, self.loss_factor, **values, trim=trim)
 
 
@@ -218,6 +223,7 @@ class ReflexPilot(ArmPilot):
     def build(
         self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
     ) -> Truth:
+        """Return a lever whose arm reacts a delay late."""
         return reflex_plant.Reflex(lever, self.delay, **values, trim=trim)
 
 
@@ -235,6 +241,7 @@ class MayoPilot(Pilot):
     def build(
         self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
     ) -> Truth:
+        """Return the hand of the pilot's somatotype as Mayo measured it."""
         return mayo_plant.Mayo(mayo_plant.HANDS[self.somatotype], lever.lever_length, trim)
 
 

@@ -53,6 +53,7 @@ class Reflex(Truth):
 
     @property
     def parameters(self) -> Mapping[str, FloatArray]:
+        """m_p, c_p and k_p of the arm, k_r and c_r of the delayed reaction, in SI units."""
         return {name: getattr(self, name) for name in ("m_p", "c_p", "k_p", "k_r", "c_r")}
 
     @property
@@ -62,10 +63,12 @@ class Reflex(Truth):
 
     @property
     def rest(self) -> FloatArray:
+        """The trim angle [rad]."""
         return self.trim
 
     @property
     def dynamics(self) -> Dynamics:
+        """Natural frequency [Hz] and damping ratio of the dominant mode."""
         return dominant_dynamics(self, *self.parameters.values(), self.trim)
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
@@ -80,6 +83,7 @@ class Reflex(Truth):
         return Transfer(_times(alone.numerator, ahead), denominator)
 
     def body(self, conditions: Conditions) -> ReflexPlant:
+        """Return the lever at the first sample, at rest at its trim angle."""
         return ReflexPlant(self, conditions)
 
 

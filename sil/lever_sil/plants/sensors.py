@@ -56,6 +56,7 @@ class Stuck(Fault):
     """The last reading before, noise and all, over and over."""
 
     def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        """Repeat the last reading before the fault."""
         corruption.source[inside] = max(inside[0] - 1, 0)
 
 
@@ -66,6 +67,7 @@ class Scale(Fault):
     factor: float = quantity("1")
 
     def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        """Multiply the readings by `factor`."""
         corruption.factor[inside] *= self.factor
 
 
@@ -77,6 +79,7 @@ class Spikes(Fault):
     size: float = quantity(SIGNAL, above=0.0)
 
     def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        """Add or subtract `size` at random samples."""
         hit = rng.random(len(inside)) < self.share
         corruption.offset[inside] += hit * rng.choice((-self.size, self.size), len(inside))
 

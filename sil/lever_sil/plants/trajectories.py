@@ -45,6 +45,7 @@ class Constant(Trajectory):
     value: float = quantity(SIGNAL)
 
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return the constant value."""
         return np.full_like(time, self.value)
 
 
@@ -62,9 +63,11 @@ class Steps(Trajectory):
         check_rising(self.at)
 
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return `first`, then each value of `to` from its time on."""
         return np.array((self.first, *self.to))[np.searchsorted(self.at, time, side="right")]
 
     def changes(self) -> tuple[float, ...]:
+        """Return the times of the steps [s]."""
         return self.at
 
 
@@ -78,6 +81,7 @@ class Ramp(Trajectory):
     duration: float = quantity("s", above=0.0)
 
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return a straight line from `first` to `last`, constant before and after."""
         return np.interp(time, (self.start, self.start + self.duration), (self.first, self.last))
 
 
@@ -91,6 +95,7 @@ class Fatigue(Trajectory):
     time_constant: float = quantity("s", above=0.0)
 
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return an exponential approach from `first` to `last`."""
         elapsed = np.maximum(time - self.start, 0.0)
         return self.last + (self.first - self.last) * np.exp(-elapsed / self.time_constant)
 
@@ -105,6 +110,7 @@ class Sinusoid(Trajectory):
     phase: float = quantity("rad", 0.0)
 
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return a sine about `mean`."""
         return self.mean + self.amplitude * np.sin(2.0 * math.pi * self.frequency * time + self.phase)
 
 
@@ -115,6 +121,7 @@ class Noise(excitation.Noise, Trajectory):
     mean: float = quantity(SIGNAL)
 
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return band-limited noise about `mean`."""
         return self.mean + self.samples(time, rng)
 
 
@@ -132,6 +139,7 @@ class RandomWalk(Trajectory):
             raise ValueError("must have least <= first <= greatest and least < greatest")
 
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return a random walk of the logarithm, reflected at `least` and `greatest`."""
         step = math.sqrt(float(time[1] - time[0])) if len(time) > 1 else 0.0
         walk = np.zeros_like(time)
         np.cumsum(self.rate * step * rng.standard_normal(len(time) - 1), out=walk[1:])
@@ -153,10 +161,12 @@ class Sequence(Trajectory):
         check_rising(self.at)
 
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return the values of one part after another, each in its own time of the run."""
         part = np.searchsorted(self.at, time, side="right")
         return np.stack([trajectory.values(time, rng) for trajectory in self.parts])[part, np.arange(len(time))]
 
     def changes(self) -> tuple[float, ...]:
+        """Return the times between the parts, and those of the jumps inside them [s]."""
         edges = (0.0, *self.at, math.inf)
         inner = (
             time

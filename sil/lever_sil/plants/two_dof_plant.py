@@ -59,6 +59,7 @@ class TwoDof(Truth):
 
     @property
     def parameters(self) -> Mapping[str, FloatArray]:
+        """m_p, c_p and k_p of the arm, m_t, c_t and k_t of trunk and seat, in SI units."""
         return {name: getattr(self, name) for name in ("m_p", "c_p", "k_p", "m_t", "c_t", "k_t")}
 
     @property
@@ -68,10 +69,12 @@ class TwoDof(Truth):
 
     @property
     def rest(self) -> FloatArray:
+        """The trim angle [rad]."""
         return self.trim
 
     @property
     def dynamics(self) -> Dynamics:
+        """Natural frequency [Hz] and damping ratio of the dominant mode."""
         return dominant_dynamics(self, *self.parameters.values(), self.trim)
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
@@ -88,6 +91,7 @@ class TwoDof(Truth):
         return Transfer(numerator, _product(own + rise**2 * arm, trunk) - rise**2 * _product(arm, arm))
 
     def body(self, conditions: Conditions) -> TwoDofPlant:
+        """Return the lever and the trunk at the first sample, at rest."""
         return TwoDofPlant(self, conditions)
 
 

@@ -31,6 +31,7 @@ class SimulationSource(Source):
         self._truth: tuple[float, Truth] | None = None  # when the run began by the clock, and what is true in it
 
     def run(self) -> None:
+        """Simulate the scenario in real time until stopped, each time with the next seed."""
         scenario = self.scenario
         while not self._stopping.is_set():
             self._truth = time.monotonic(), scenario.truth(scenario.time())
@@ -42,6 +43,7 @@ class SimulationSource(Source):
             self.run_number += 1
 
     def stop(self) -> None:
+        """Stop the simulation and close its bus."""
         super().stop()
         self._bus.shutdown()
 
@@ -49,6 +51,7 @@ class SimulationSource(Source):
         self._bus.send(can.Message(arbitration_id=identifier, is_extended_id=False, data=data))
 
     def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
+        """Return the true values now by name, and theta/z_ddot at `frequencies` [Hz]; None before the first run."""
         if self._truth is None:
             return None
         start, truth = self._truth

@@ -64,6 +64,7 @@ class FirmwareDither(excitation.Excitation):
     rms: float = quantity(SIGNAL, least=0.0)
 
     def scaled(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return zeros: the firmware makes this torque."""
         return np.zeros_like(time)
 
 
@@ -183,6 +184,7 @@ class Scenario:
 
     @cached_property
     def true_lever(self) -> lever_plant.Lever:
+        """The constants of the true lever: the settings, with the differences of [lever]."""
         return lever_plant.Lever.from_settings(self.config.settings | dict(self.lever or {}))
 
     def time(self) -> FloatArray:
@@ -264,8 +266,25 @@ def load(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
     """
     if not isinstance(name_or_path, (str, os.PathLike)):
         raise ScenarioError(f"{name_or_path!r} is no scenario: give its name, or the path of a .toml file")
-    name = os.fspath(name_or_path)
-    return from_toml(SHELF.content(name), name, overrides)
+    name, given = os.fspath(name_or_path), list(overrides)
+    content = SHELF.content(name)
+    try:
+        return from_toml(content, name, given)
+    except ScenarioError as error:
+        raise ScenarioError(_with_cause(str(error), content, name, given)) from None
+
+
+def _with_cause(said: str, content: bytes, name: str, overrides: list[str]) -> str:
+    """Return an error with the first override that it occurs with in place of the file, unless it is the file's own."""
+    for count in range(len(overrides) + 1):
+        try:
+            from_toml(content, name, overrides[:count])
+        except ScenarioError as error:  # noqa: PERF203
+            if str(error) == said:
+                break
+    if count == 0 or said.startswith("--set "):
+        return said
+    return f"--set {overrides[count - 1]}: {said.removeprefix(f'{file_of(name)}: ')}"
 
 
 def from_toml(content: bytes, name_or_path: str, overrides: Iterable[str] = ()) -> Scenario:

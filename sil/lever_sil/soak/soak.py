@@ -64,6 +64,7 @@ class Sums:
     """Of lever_health_t, and of the faults that there were."""
 
     def add(self, other: Sums) -> None:
+        """Add the sums of other flights."""
         for name in ("seconds", "looks", "judged", "unflagged", "nees", "nis", "silent_s", "not_finite", "in_fault"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
         for name, count in other.within.items():
@@ -76,8 +77,8 @@ class Sums:
         return {
             "flights": round(self.seconds / DURATION),
             "flagged [%]": 100.0 * (1.0 - self.unflagged / max(self.judged, 1)),
-            "NEES [1]": self.nees / shown,
-            "NIS [1]": self.nis / shown,
+            "NEES (expected 1)": self.nees / shown,
+            "NIS (expected 1)": self.nis / shown,
             **{f"{name} within 2 sigma [%]": 100.0 * count / shown for name, count in self.within.items()},
             "silent [s]": self.silent_s,
             **{name: self.counts[name] for name in ("lost", "late", "corrupt", "recoveries")},
@@ -113,6 +114,7 @@ class SoakResult:
 
     @property
     def total(self) -> Sums:
+        """The sums over all hours."""
         total = Sums()
         for part in self.parts:
             total.add(part.sums)
@@ -180,6 +182,7 @@ _COUNTS = ("lost", "late", "corrupt", "recoveries")
 
 
 def judge(scenario: Scenario, time: FloatArray, truth: Any, estimates: NDArray[Any], healths: NDArray[Any]) -> Sums:
+    """Return the sums of one flight from its estimates and healths at `time` [s] and the truth there."""
     values = {**truth.parameters, **vars(truth.dynamics)}
     judged = judged_samples(scenario, time) & np.isfinite(values["natural_frequency"])
     running = (healths["mode"] == lib.LEVER_MODE_RUN) | (healths["mode"] == lib.LEVER_MODE_FROZEN)

@@ -33,11 +33,11 @@ def build(result: SoakResult, rows: list[Row], verdict: str) -> str:
 def _chart(result: SoakResult) -> Figure:
     hours = np.arange(1.0, len(result.parts) + 1.0)
     rows = [part.sums.row() for part in result.parts]
-    titles = ("NEES, NIS [1]", "within 2σ [%]", "memory [MiB]")
+    titles = ("NEES, NIS (expected 1)", "within 2σ [%]", "memory [MiB]")
     figure = Figure([axis(title) for title in titles], axis("hour", range=[0.5, hours[-1] + 0.5]), height=620)
     figure.over_time = False
     for name, colour in (("NEES", SERIES[0]), ("NIS", SERIES[1])):
-        figure.add(line(hours, np.array([row[f"{name} [1]"] for row in rows]), name, colour))
+        figure.add(line(hours, np.array([row[f"{name} (expected 1)"] for row in rows]), name, colour))
     for quantity, colour in zip(QUANTITIES, SERIES, strict=False):
         held = np.array([row[f"{quantity} within 2 sigma [%]"] for row in rows])
         figure.add(line(hours, held, f"{quantity} within 2σ", colour, row=1))

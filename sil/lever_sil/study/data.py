@@ -144,10 +144,12 @@ class Batch:
 
     @property
     def runs(self) -> int:
+        """How many runs there are."""
         return len(self.y)
 
     @property
     def samples(self) -> int:
+        """How many samples a run has."""
         return int(self.y.shape[1])
 
     def rest(self, at: NDArray[np.int64]) -> Array:

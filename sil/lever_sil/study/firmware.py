@@ -31,6 +31,7 @@ class Firmware:
     settings: Mapping[str, float] = field(default_factory=dict)
 
     def __call__(self, batch: Batch, at: NDArray[np.int64]) -> Estimates:
+        """Run the firmware over a batch; report at the samples `at`."""
         config = Config(self.model, self.preload, self.estimator, self.adaptation, settings=EXACT | dict(self.settings))
         time_us = np.arange(batch.samples, dtype=np.int64) * round(batch.period * 1e6)
         runs = [

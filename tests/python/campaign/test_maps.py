@@ -14,7 +14,7 @@ from lever_sil.campaign import border, cells, chunks, maps, spec
 from lever_sil.campaign.cells import Map, Runs
 from lever_sil.campaign.chunks import Plan
 from lever_sil.campaign.spec import Failure
-from lever_sil.study.figures.maps import Scale
+from lever_sil.study.figures.maps import Line, Scale, across
 from python.campaign.conftest import SMALL
 from python.conftest import Refused, Run
 
@@ -173,7 +173,9 @@ def test_what_is_no_folder_of_a_campaign_has_no_figures(refused: Refused, tmp_pa
     assert "is not the folder of a campaign" in refused("figures", "--campaign", tmp_path, "--out", tmp_path / "out")
 
 
-def test_a_line_beyond_the_map_runs_along_its_edge() -> None:
+def test_of_a_border_beyond_the_map_only_the_band_is_drawn_to_the_edge() -> None:
     scale = Scale("noise", NOISE, is_log=True)
-    places = scale.place(np.array([-np.inf, 0.001, 0.1, np.inf]))
-    assert [scale.value(each) for each in places] == pytest.approx([0.01, 0.01, 0.1, 10.0])
+    low, at, high = np.array([-np.inf, 0.1, 0.2]), np.array([-np.inf, 0.1, np.inf]), np.array([0.05, 0.1, np.inf])
+    drawn = np.exp(across(scale, Line((0, 1, 2), at, low, high)))
+    expected = np.array(((0.01, 0.1, 0.2), (np.nan, 0.1, np.nan), (0.05, 0.1, 10.0)))
+    assert drawn == pytest.approx(expected, nan_ok=True)

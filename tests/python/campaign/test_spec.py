@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from lever_sil.campaign import design, spec
+from lever_sil.campaign.entrants import ENTRANTS
 from lever_sil.campaign.spec import Spec
 from lever_sil.toml_tables import ScenarioError
 
@@ -153,3 +155,9 @@ def test_the_map_of_tracking_has_a_hundred_thousand_runs_of_a_minute() -> None:
     tracking = spec.load("tracking")
     assert tracking.runs >= 100_000
     assert tracking.first.duration == 60.0
+
+
+def test_the_page_names_every_estimator_and_no_other(root: Path) -> None:
+    page = (root / "sil/lever_sil/campaign/README.md").read_text(encoding="utf-8")
+    (row,) = (line for line in page.splitlines() if line.startswith("| `estimators` |"))
+    assert set(re.findall(r"`(\w+)`", row.split("|")[2])) == set(ENTRANTS)

@@ -29,6 +29,7 @@ def test_sim_writes_its_files_and_prints_its_tables(lever: Run, tmp_path: Path) 
     assert summary["samples"] == 1000
     assert summary["passed"]
     assert summary["verdict"] in out
+    assert "below 10 % after [s]" in out
     assert len((out_dir / "trace.csv").read_text().splitlines()) == 1001
     assert "<html" in (out_dir / "report.html").read_text()[:200]
     title, run, _ = json.loads(tables.read_text()).values()
@@ -75,7 +76,8 @@ def test_settings_prints_a_settings_file_for_the_firmware(lever: Run, tmp_path: 
     [
         (("sim", "nope"), "no scenario 'nope'; there are base_dither"),
         (("sim",), "one of the arguments"),
-        (("sim", "steady", "--set", "pilot.m_p=3"), "steady.toml: pilot.m_p: 3 is not a quantity"),
+        (("sim", "steady", "--set", "pilot.m_p=3"), "lever: error: --set pilot.m_p=3: pilot.m_p: 3 is not"),
+        (("sim", "steady", "--seed", "-1"), "argument --seed: -1 is not from 0 to "),
         (("sim", "steady", "--interface", "slcan"), "--interface slcan needs --channel"),
         (
             ("sim", "steady", "--interface", "slcan", "--channel", "/dev/nothing"),

@@ -123,6 +123,13 @@ def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert table.MISSED in printed
 
 
+@pytest.mark.usefixtures("short")
+def test_without_out_no_file_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["envelope", "--only", "reported", "--seeds", "1"]) == 0
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_figure_shows_on_which_side_of_its_limit_it_is() -> None:
     limits = (Limit("f_n largest", most=1.0), Limit("f_n largest", most=2.0, over="worst"))
     condition = Condition("steady", "", limits=limits)

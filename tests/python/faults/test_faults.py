@@ -102,6 +102,17 @@ def test_readings_are_spoilt_as_the_fault_says() -> None:
     assert spoilt(readings.clock_offset(1.0)).time_us.tolist()[1:3] == [1000, 1002000]
 
 
+def test_without_out_no_file_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["faults", "--only", "z_ddot_sign_from_power_on", "--seeds", "1"]) == 0
+    said = capsys.readouterr().out
+    assert "known" in said.splitlines()[3].split()
+    assert "1 faults: 1 not met as demanded (0 silent); 1 of these are known limitations." in said
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_command_writes_its_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "rows.json"
     only = ["--only", "theta_stuck", "foreign_load", "--seeds", "1"]
@@ -122,6 +133,10 @@ def test_a_fault_that_is_not_met_is_named_and_explained(pilot: Pilot) -> None:
     assert result.broken == ["to flag"]
     assert table.unexpected([result]) == ["clock_wraps"]
     assert "<strong" in faults_page.build([result], 1)
+    assert table.state(result) == table.MISSED
+    known = replace(result, row=replace(row, name=next(iter(KNOWN))))
+    assert table.state(known) == "known"
+    assert 'class="verdict watch"' in faults_page.build([known], 1)
 
 
 def spoilt(right: Record, **columns: tuple[slice, float]) -> Record:

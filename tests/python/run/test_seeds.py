@@ -135,7 +135,7 @@ def test_seeds_on_the_command_line(lever: Run, tmp_path: Path, monkeypatch: pyte
         (("--seeds", "2", "--out", "x"), "--out is for a single run: leave out --seeds"),
         (("--seeds", "2", "--interface", "socketcan"), "--interface socketcan is for a single run"),
         (("--seeds", "2", "--settings"), "--settings without a file is for a single run"),
-        (("--seeds", "2", "--set", "pilot.m_p=3"), "steady.toml: pilot.m_p: 3 is not a quantity"),
+        (("--seeds", "2", "--set", "pilot.m_p=3"), "lever: error: --set pilot.m_p=3: pilot.m_p: 3 is not a quantity"),
         (("--jobs", "2"), "--jobs is for --seeds"),
     ],
 )

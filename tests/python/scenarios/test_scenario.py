@@ -215,7 +215,9 @@ def test_what_is_nested_too_deeply_is_refused(load: Load, value: str) -> None:
         ("duration", "must be KEY=VALUE"),
         ("pilot.m_p.first=3 kg", "the scenario has no 'pilot.m_p.first'"),
         ("title.x=3", "the scenario has no 'title.x'"),
-        ("colour=red", "unknown key 'colour'"),
+        ("colour=red", "^--set colour=red: unknown key 'colour'"),
+        ("duration=2 h", "^--set duration=2 h: duration: '2 h' is out of range"),
+        ("theta_noise=9 rad", "^--set theta_noise=9 rad: settings: theta_noise = 9.0 is out of range"),
         (
             "torque.1={kind='firmware',rms='1 N m'}",
             r"no 'torque.1'; torque has 0 entries, .* torque.0=\{...\} appends one",
@@ -225,7 +227,12 @@ def test_what_is_nested_too_deeply_is_refused(load: Load, value: str) -> None:
 )
 def test_a_wrong_override_is_refused(load: Load, override: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
-        load(LEAST, override)
+        load(LEAST, "seed=3", override, "converged_after=1 s")
+
+
+def test_an_error_of_the_file_is_not_blamed_on_an_override(load: Load) -> None:
+    with pytest.raises(ScenarioError, match=r"^[^-].*made\.toml: title: 1 is not a string"):
+        load(LEAST.replace('"t"', "1"), "seed=3")
 
 
 def test_an_override_appends_to_a_list(load: Load) -> None:

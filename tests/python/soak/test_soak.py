@@ -24,6 +24,7 @@ def summary(tmp_path_factory: pytest.TempPathFactory) -> Content:
     assert main(["soak", "--hours", "0.1667", "--json", str(path), "-o", str(page)]) == 0
     content: Content = json.loads(path.read_text())
     assert "Consistency by the hour" in page.read_text()
+    assert "2 flights of 5 min with 6 faults: NEES " in page.read_text()
     return content
 
 
@@ -33,8 +34,8 @@ def test_ten_minutes(summary: Content) -> None:
     assert total["flights"] == 2
     assert sum(summary["faults"].values()) == 6
     assert summary["troubles"] == []
-    assert 0.2 < total["NEES [1]"] < 3.0
-    assert total["NIS [1]"] == pytest.approx(1.0, abs=0.05)
+    assert 0.2 < total["NEES (expected 1)"] < 3.0
+    assert total["NIS (expected 1)"] == pytest.approx(1.0, abs=0.05)
     assert total["natural_frequency within 2 sigma [%]"] > 80.0
     assert total["recoveries"] == 0
 
@@ -68,11 +69,11 @@ def judged(relative: float, sigma: float) -> soak.Sums:
 
 def test_what_is_wrong_shows() -> None:
     right = judged(0.1, 0.1).row()
-    assert right["NEES [1]"] == pytest.approx(1.0, rel=1e-4)
+    assert right["NEES (expected 1)"] == pytest.approx(1.0, rel=1e-4)
     assert right["k_p within 2 sigma [%]"] == 100.0
     assert right["silent [s]"] == 0.0
     wrong = judged(0.1, 0.02)
-    assert wrong.row()["NEES [1]"] == pytest.approx(25.0, rel=1e-3)
+    assert wrong.row()["NEES (expected 1)"] == pytest.approx(25.0, rel=1e-3)
     assert wrong.row()["k_p within 2 sigma [%]"] == 0.0
     assert wrong.silent_s == pytest.approx(wrong.unflagged * 0.02)
     part = soak.Part(soak.Sums(not_finite=3, in_fault=50), 130.0)
@@ -84,7 +85,9 @@ def test_what_is_wrong_shows() -> None:
     ]
 
 
-def test_wrong_hours_are_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_wrong_hours_and_seeds_are_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     for hours in ("0", "-1", "nan", "1e9"):
         assert main(["soak", f"--hours={hours}"]) == 2
         assert "above 0, and at most 1000" in capsys.readouterr().err
+    assert main(["soak", "--seed=-1"]) == 2
+    assert "argument --seed: -1 is not from 0" in capsys.readouterr().err

@@ -554,6 +554,7 @@ def test_csv_has_every_figure_with_all_digits() -> None:
         (("--estimators", "kalman"), "no estimator 'kalman'"),
         (("--models", "quadratic"), "no model 'quadratic'"),
         (("--seeds", "0"), "--seeds 0: must be at least 1"),
+        (("--seed", "-1"), "argument --seed: -1 is not from 0 to "),
         (("--jobs", "0"), "--jobs 0: must be at least 1"),
         (("--duration", "0.1"), "--duration 0.1: must be from 1 to 3600 s"),
         (("--scenarios", "steady", "--estimators", "dual_r10_q10"), "none of these estimators takes part"),

@@ -310,6 +310,7 @@ def test_every_colour_of_the_page_exists_in_both_themes(folder: Path) -> None:
 def test_text_is_set_in_type() -> None:
     assert in_html("m_p < 2 & a_21") == "m<sub>p</sub> &lt; 2 &amp; a<sub>21</sub>"
     assert in_mathtext("|θ/z̈| ẋ [N s/m], k_p") == r"|θ/$\ddot{z}$| $\dot{x}$ [N s/m], $k_{p}$"
+    assert in_mathtext(in_html("m_p < 2 & a_21")) == "$m_{p}$ < 2 & $a_{21}$"
     assert "<sub>" not in figures_page.build([figure_of("states")]).split("<body>")[0]
 
 
@@ -374,7 +375,7 @@ def test_the_figures_of_the_paper_have_its_numbers_and_say_what_differs(lever: R
         (("--only", "grips"), "unknown figure 'grips'; did you mean grip?"),
         (("--only", "states", "none"), "unknown figure 'none'; there are bode"),
         (("--only",), "argument --only: expected at least one argument (see `lever figures --help`)"),
-        (("--seed", "-1"), "argument --seed: -1 is negative"),
+        (("--seed", "-1"), "argument --seed: -1 is not from 0 to "),
         (("--seed", "x"), "argument --seed: invalid seed value: 'x'"),
     ],
 )
@@ -383,6 +384,10 @@ def test_what_is_wrong_is_said_in_a_line(lever: Run, tmp_path: Path, arguments: 
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert message in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_without_a_folder_nothing_is_drawn(lever: Run) -> None:
+    assert lever("figures") == (2, "", "lever: error: -o DIR is missing: the folder for the files\n")
 
 
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(

@@ -11,7 +11,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 import pytest
-from lever_sil.study.figures import data, figures_page, maps, printed
+from lever_sil.study.figures import data, figures_page, maps, plotted, printed
 from lever_sil.study.figures.maps import Chart, Line, MapFigure, Scale
 from numpy.typing import NDArray
 from PIL import Image
@@ -56,6 +56,12 @@ def test_of_many_values_four_are_written_with_both_ends() -> None:
     assert [text.get_text() for text in axes.get_yticklabels()] == ["1", "4", "7", "10"]
 
 
+def test_large_numbers_are_written_out() -> None:
+    assert [maps.written(value) for value in (0.0123, 1.24, 99.9, 1500.0, -1500.0, 3.6e6, "fixed")] == [
+        *("0.012", "1.2", "100", "1500", "-1500", "3600000", "fixed")
+    ]
+
+
 def test_a_cell_has_the_colour_of_its_value_and_the_line_is_where_it_belongs() -> None:
     figure = map_figure()
     pixels = np.asarray(Image.open(io.BytesIO(printed.render(figure, "png", "double"))).convert("RGB")).astype(int)
@@ -74,13 +80,13 @@ def test_a_cell_has_the_colour_of_its_value_and_the_line_is_where_it_belongs() -
 
 
 def test_the_page_has_every_value_and_the_line_inside_the_map(tmp_path: Path) -> None:
-    spec = maps.spec(map_figure())
+    spec = plotted.map_spec(map_figure())
     heats = [trace for trace in spec["data"] if trace["type"] == "heatmap"]
     assert len(heats) == 8
     assert heats[2]["z"] == [[12.0, 22.0, 32.0], [42.0, 52.0, None]]
     assert (heats[2]["x"], heats[2]["y"]) == ([0.01, 0.1, 1.0], [0.0, 1.0])
     lines = [trace for trace in spec["data"] if trace["type"] == "scatter"]
-    assert lines[1]["x"] == pytest.approx([0.01, 0.3])
+    assert lines[1]["x"] == [None, pytest.approx(0.3)]  # no line beyond the map
     assert lines[0]["x"] == pytest.approx([0.01, 0.2, 1.0, 0.05])
     assert lines[0]["y"] == [0.0, 1.0, 1.0, 0.0]
     (tmp_path / "page.html").write_text(figures_page.build([map_figure()]), encoding="utf-8")

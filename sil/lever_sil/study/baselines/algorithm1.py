@@ -53,6 +53,7 @@ class Algorithm1:
     ahead: float = 0.0
 
     def __call__(self, batch: Batch, at: NDArray[np.int64]) -> Estimates:
+        """Run the filter over a batch; report at the samples `at`."""
         steps = max(1, round(self.ahead / batch.period))
         return followed("PARAMETERS", batch, at, lambda same: ParameterFilter(same, steps), steps=steps)
 
@@ -82,6 +83,7 @@ class ParameterFilter:
         self._parameters, self._states = points[:, :, :PARAMETERS], points[:, :, PARAMETERS:]
 
     def step(self, k: int) -> None:
+        """Predict the states to sample `k`, and update the parameters every few samples."""
         self._states = self._batch.move(k - 1, self._states, self._parameters)
         if k % self._steps == 0:
             self._update(k)

@@ -50,14 +50,17 @@ class Ratios:
     per_mass: float
 
     def of_parameters(self, p: Array) -> Array:
+        """Return (..., 3) 1/M, c/M and k/M."""
         inertia = self.own + self.per_mass * p[..., 0]
         return np.stack((1.0 / inertia, p[..., 1] / inertia, p[..., 2] / inertia), axis=-1)
 
     def parameters(self, q: Array) -> Array:
+        """Return (..., 3) m, c and k."""
         inertia = 1.0 / q[..., 0]
         return np.stack(((inertia - self.own) / self.per_mass, q[..., 1] * inertia, q[..., 2] * inertia), axis=-1)
 
     def slope(self, q: Array) -> Array:
+        """Return (..., 3, 3) the derivative of m, c and k by the coefficients."""
         inertia = 1.0 / q[..., 0]
         slope = np.zeros((*q.shape, 3))
         slope[..., 0, 0] = -(inertia**2) / self.per_mass
@@ -70,12 +73,15 @@ class Same:
     """q = p."""
 
     def of_parameters(self, p: Array) -> Array:
+        """Return the parameters, which are the coefficients."""
         return p
 
     def parameters(self, q: Array) -> Array:
+        """Return the coefficients, which are the parameters."""
         return q
 
     def slope(self, q: Array) -> Array:
+        """Return (..., 3, 3) identity matrices."""
         return np.broadcast_to(np.eye(3), (*q.shape, 3))
 
 

@@ -55,6 +55,7 @@ class DualEkf:
         self.innovation, self.innovation_covariance = no_innovation(batch.runs)
 
     def step(self, k: int) -> None:
+        """Update states, then parameters, with the outputs of sample `k`."""
         predicted, dx, dw = self._slopes.move(k - 1, self.x, self.w)
         derivative = dx @ self.derivative + dw
         covariance = dx @ self.x_covariance @ transposed(dx) + self._process_noise

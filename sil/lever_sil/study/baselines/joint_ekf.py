@@ -51,6 +51,7 @@ class Joint:
 
     @property
     def w_covariance(self) -> Array:
+        """(B, 3, 3) covariance of the parameters."""
         return self.covariance[:, :PARAMETERS, :PARAMETERS]
 
     def predict(self, k: int) -> tuple[Array, Array]:
@@ -58,6 +59,7 @@ class Joint:
         raise NotImplementedError
 
     def step(self, k: int) -> None:
+        """Predict to sample `k` and update with its outputs; missing outputs are skipped."""
         predicted, covariance = self.predict(k - 1)
         self.innovation, noise = self.batch.y[:, k] - predicted, self.output_noise
         if self.batch.missing is not None:
@@ -79,6 +81,7 @@ class JointEkf(Joint):
         self._slopes = Slopes(batch)
 
     def predict(self, k: int) -> tuple[Array, Array]:
+        """Return the states at sample `k` + 1 and the joint covariance, by linearisation."""
         predicted, dx, dw = self._slopes.move(k, self.x, self.w)
         transition = repeated(np.eye(PARAMETERS + STATES), self.batch.runs)
         transition[:, PARAMETERS:, :PARAMETERS], transition[:, PARAMETERS:, PARAMETERS:] = dw, dx

@@ -65,6 +65,7 @@ class JointUkf(Joint):
         self._root, (self._of_mean, self._of_covariance) = np.sqrt(transform.reach), transform.weights
 
     def predict(self, k: int) -> tuple[Array, Array]:
+        """Return the states at sample `k` + 1 and the joint covariance, by sigma points."""
         spread = self._root * transposed(factor(self.covariance))
         offsets = np.concatenate((np.zeros_like(spread[:, :1]), spread, -spread), axis=1)
         w = self.w[:, np.newaxis] + offsets[..., :PARAMETERS]

@@ -30,6 +30,7 @@ class Nlms:
     corner: float = 1.0
 
     def __call__(self, batch: Batch, at: NDArray[np.int64]) -> Estimates:
+        """Run the normalised LMS over a batch; report at the samples `at`, without a covariance."""
         data = equations(batch, self.window, self.corner)
         guess, covariance = data.first_guess(batch.knowledge)
         scale = covariance.diagonal()

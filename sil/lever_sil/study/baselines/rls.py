@@ -42,6 +42,7 @@ class Rls:
     regularised: bool = False
 
     def __call__(self, batch: Batch, at: NDArray[np.int64]) -> Estimates:
+        """Run recursive least squares over a batch; report at the samples `at`."""
         data = equations(batch, self.window, self.corner)
         forget = math.exp(-data.period / self.forgetting)
         shape = (batch.runs, len(data.ends) + 1)

@@ -128,13 +128,16 @@ class Matched(Case):
 
     @property
     def own_settings(self) -> Mapping[str, float]:
+        """The prior standard deviations of the model's parameters."""
         return PRIOR[self.model]
 
     @property
     def noise(self) -> Mapping[str, float]:
+        """The process noise of the case, as a setting."""
         return {"theta_dot_process_noise": self.process_noise}
 
     def batch(self, plan: Plan) -> Batch:
+        """Return runs whose parameters walk exactly as assumed, detrended with preload `trim`."""
         exact = self._exact(plan)
         if self.preload == "fixed":
             return exact
@@ -142,9 +145,11 @@ class Matched(Case):
         return detrended(exact, defaults["trim_corner"], defaults["align_time"])
 
     def judged(self, time: Array, plan: Plan) -> BoolArray:
+        """Return True from 15 s on, scaled to the length of the plan."""
         return time >= self.scaled(15.0, plan)
 
     def references(self, batch: Batch, at: NDArray[np.int64], plan: Plan) -> References:
+        """Return the variances of the linearised filter and of the posterior Cramér-Rao bound."""
         exact = batch if self.preload == "fixed" else self._exact(plan)
         return References(
             linearised.variances(exact, at, linearised.covariances(exact, at)),
@@ -183,17 +188,21 @@ class Stepped(Case):
 
     @property
     def noise(self) -> Mapping[str, float]:
+        """The process noise of the step, as a setting."""
         return {"theta_dot_process_noise": self.step.process_noise}
 
     def batch(self, plan: Plan) -> Batch:
+        """Return runs in which the parameters step."""
         at = self.scaled(self.step.at, plan)
         step = replace(self.step, model=self.model, at=at, duration=self.length(plan))
         return stepped(step, self.runs(plan), plan.seed)
 
     def judged(self, time: Array, plan: Plan) -> BoolArray:
+        """Return True from 15 s to the step, scaled to the length of the plan."""
         return (time >= self.scaled(15.0, plan)) & (time < self.scaled(self.step.at, plan))
 
     def change(self, plan: Plan) -> float:
+        """Return the time of the step [s]."""
         return self.scaled(self.step.at, plan)
 
 
@@ -217,15 +226,18 @@ class Paper(Case):
 
     @property
     def own_settings(self) -> Mapping[str, float]:
+        """The prior standard deviations of the model's parameters."""
         return PRIOR[self.model]
 
     @property
     def noise(self) -> Mapping[str, float]:
+        """The measurement and process noise of the case, as settings."""
         defaults = {row.name: row.default for row in settings_table()}
         outputs = {name: self.output_noise * defaults[name] for name in ("theta_noise", "theta_dot_noise")}
         return {**outputs, "theta_dot_process_noise": self.process_noise}
 
     def batch(self, plan: Plan) -> Batch:
+        """Return runs whose parameters stay, drift or jump, detrended."""
         settings = {**self.own_settings, **self.noise}
         walks = {f"{name}_walk": 0.0 for name in KINDS[self.model].parameters} if self.truth != "drift" else {}
         told = knowledge(Condition(self.model, settings=settings).all_settings(), KINDS[self.model])
@@ -243,12 +255,14 @@ class Paper(Case):
         return jump(batch.samples, round(change / batch.period), np.array(_JUMP[self.model]))
 
     def judged(self, time: Array, plan: Plan) -> BoolArray:
+        """Return True from 10 s on, except for 5 s after a jump, scaled to the length of the plan."""
         settled: BoolArray = time >= self.scaled(10.0, plan)
         if (change := self.change(plan)) is not None:
             settled &= (time < change) | (time >= change + self.scaled(5.0, plan))
         return settled
 
     def change(self, plan: Plan) -> float | None:
+        """Return the time of the jump [s]; None without one."""
         return self.scaled(20.0, plan) if self.truth == "jump" else None
 
 
@@ -264,6 +278,7 @@ class Protocol(Paper):
     output_noise: float = 1.0
 
     def factors(self, batch: Batch, plan: Plan) -> Array | None:
+        """Return (T, 3) factors of the parameters over time; None where they do not change."""
         time = np.arange(batch.samples) * batch.period
         if self.truth == "slow":
             start, length = self.scaled(10.0, plan), self.scaled(20.0, plan)
@@ -295,9 +310,11 @@ class Recorded(Case):
 
     @property
     def own_settings(self) -> Mapping[str, float]:
+        """The settings of the scenario."""
         return self._scenario.settings or {}
 
     def batch(self, plan: Plan) -> Batch:
+        """Return runs of the shipped scenario."""
         return recorded(self.name, self.runs(plan), plan.seed, plan.duration)
 
     def runs(self, plan: Plan) -> int:
@@ -305,6 +322,7 @@ class Recorded(Case):
         return min(plan.seeds, _MOST_RECORDED)
 
     def judged(self, time: Array, plan: Plan) -> BoolArray:
+        """Return True from `converged_after` after each jump on."""
         jumps = np.array([jump for jump in self._scenario.changes() if jump < self.length(plan)])
         last = jumps[np.searchsorted(jumps, time, side="right") - 1]
         judged: BoolArray = time - last >= self.scaled(self._scenario.converged_after, plan)

@@ -47,7 +47,7 @@ def bound(rows: Sequence[Row], model: str, preload: str) -> Figure | None:
 def nees(rows: Sequence[Row], model: str) -> Figure | None:
     """Return mean NEES of each estimator in the matched cases of a model, preload fixed, with its 95 % band."""
     chosen = [row for row in _walks(rows, model, "fixed") if math.isfinite(row.nees)]
-    figure = _lanes(chosen, "NEES", lambda row: row.nees, lambda _: 0.0, 3.0)
+    figure = _lanes(chosen, "NEES (expected 3)", lambda row: row.nees, lambda _: 0.0, 3.0)
     if figure is not None:
         figure.shapes += [_vertical(edge, "fault") for edge in (chosen[0].nees_low, chosen[0].nees_high)]
     return figure

@@ -46,6 +46,7 @@ class Difference:
 
     @property
     def significant(self) -> bool:
+        """Whether the difference is significant at LEVEL."""
         return self.probability < LEVEL
 
     def interval(self) -> tuple[float, float]:

@@ -55,10 +55,10 @@ def _line(row: Row) -> dict[str, Cell]:
     line["± of these"] = _number(max(row.linearised_error), 2)
     line |= {f"{name} ÷ Cramér-Rao": _number(value) for name, value in zip(names, row.bound, strict=True)}
     line |= {f"{name} ÷ reference": _number(value) for name, value in zip(names, row.against, strict=True)}
-    line["NEES (3)"] = _number(row.nees)
+    line["NEES (expected 3)"] = _number(row.nees)
     line["95 % band"] = None if math.isnan(row.nees_low) else f"{row.nees_low:.2f}-{row.nees_high:.2f}"
     line["NEES inside [1]"] = _number(row.nees_inside)
-    line["NIS (2)"] = _number(row.nis)
+    line["NIS (expected 2)"] = _number(row.nis)
     line["NIS inside [1]"] = _number(row.nis_inside)
     line["settled, median [s]"] = _number(row.settled_median)
     line["settled, worst [s]"] = _number(row.settled_worst)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from . import maps
 from .description import Band, Figure, Surface, Trace
-from .maps import MapFigure
+from .maps import Line, MapFigure
 
 COLUMNS = ("column", "chart", "series", "time_s", "frequency_Hz", "value", "low", "high")
 """Of the table: titles of column and chart, name of the curve; of a band low and high, of a surface the frequency."""
@@ -19,7 +18,7 @@ COLUMNS = ("column", "chart", "series", "time_s", "frequency_Hz", "value", "low"
 def table(figure: Figure | MapFigure) -> str:
     """CSV, a row for each point."""
     if isinstance(figure, MapFigure):
-        return maps.table(figure)
+        return _map_table(figure)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -51,3 +50,26 @@ def _surface(surface: Surface) -> Iterator[list[str]]:
 def _number(value: float) -> str:
     """Seven digits, as many as single precision has; nothing for NaN."""
     return f"{value:.7g}" if np.isfinite(value) else ""
+
+
+def _map_table(figure: MapFigure) -> str:
+    """CSV, a row for each cell, and for each place of a line with its band; -inf and inf: beyond the map."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    titles = (figure.columns.label or "column", "chart", "series", figure.y.label or "y", figure.x.label)
+    writer.writerow((*titles, "value", "low", "high"))
+    for name, charts in zip(figure.rows, figure.charts, strict=True):
+        for value, chart in zip(figure.columns.values, charts, strict=True):
+            for (row, column), number in np.ndenumerate(chart.values):
+                shown = f"{number:.7g}" if np.isfinite(number) else ""
+                writer.writerow((value, name, "", figure.y.values[row], figure.x.values[column], shown, "", ""))
+            if chart.line is not None:
+                writer.writerows(_border(figure, (value, name, "border"), chart.line))
+    return text.getvalue()
+
+
+def _border(figure: MapFigure, where: Sequence[float | str], line: Line) -> list[tuple[float | str, ...]]:
+    return [
+        (*where, figure.y.values[row], "", *(f"{value:.6g}" for value in values))
+        for row, *values in zip(line.rows, line.at, line.low, line.high, strict=True)
+    ]

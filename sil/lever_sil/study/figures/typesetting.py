@@ -24,8 +24,9 @@ def in_html(text: str) -> str:
 
 
 def in_mathtext(text: str) -> str:
-    """m_p with an index and derivatives with their dots in place, as matplotlib wants them."""
-    indexed = _INDEX.sub(r"$\1_{\2}$", unicodedata.normalize("NFD", text))
+    """m_p, also as HTML, with an index and derivatives with their dots in place, as matplotlib wants them."""
+    plain = html.unescape(text.replace("<sub>", "_").replace("</sub>", ""))
+    indexed = _INDEX.sub(r"$\1_{\2}$", unicodedata.normalize("NFD", plain))
     return _ACCENT.sub(lambda match: f"${_ACCENTS[match[2]]}{{{match[1]}}}$", indexed)
 
 
