@@ -178,6 +178,8 @@ class EstimatorFrames:
         there = f"; its buses: {', '.join(names)}" if names else ""
         wanted = f"{self._base:#x} BASE_SAMPLE"
         paths = self.recording.paths
+        if self._start > 0.0 and not self.frames:
+            return f"{', '.join(paths)}: there is nothing from {self._start:g} s on (--start)"
         return (
             f"{', '.join(paths)}: {self.frames} frames, but no sample ({wanted}) {where}in them{there}; for messages "
             f"other than those of lever.dbc, `lever map {shlex.quote(paths[0])} --dbc FILE` finds the signals"

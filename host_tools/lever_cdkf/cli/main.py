@@ -8,6 +8,7 @@ import errno
 import importlib.metadata
 import io
 import os
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ from ..runtime.exit_status import INTERRUPTED, MESSAGE
 from ..runtime.extras import hide_mf4, reveal_mf4
 from ..runtime.files import check_writable
 from ..runtime.provenance import version
+from ..text.suggestions import did_you_mean
 from .help_text import HelpFormatter
 
 COMMANDS = "lever_cdkf.commands"
@@ -72,6 +74,10 @@ class Parser(argparse.ArgumentParser):
         super().__init__(allow_abbrev=False, **kwargs)
 
     def error(self, message: str) -> NoReturn:
+        if choice := re.fullmatch(r"(.*invalid choice: )('.*') \(choose from (.*)\)", message):
+            names = [name.strip("' ") for name in choice[3].split(",")]
+            message = did_you_mean(choice[2].strip("'"), names, "")
+            message = f"{choice[1]}{choice[2]}: {message}" if message else choice[0]
         raise LeverError(f"{message} (see `{self.prog} --help`)")
 
 

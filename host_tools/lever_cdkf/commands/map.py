@@ -71,14 +71,14 @@ def run(args: argparse.Namespace) -> int:
     for path in (args.toml, args.out, args.json):
         check_not_input(path, read)
     signals = _signals(args, start, length)
-    mapping, proposed = propose(signals, args.log)
+    mapping, proposed, nearly = propose(signals, args.log)
     mapping = replace(mapping, time=args.time)
     inputs = {each.signal.name: each.key for each in proposed}
     others = [signal for signal in signals if signal.name not in inputs]
     changing = [signal for signal in others if signal.changes()]
     rows = [_row("", signal) for signal in changing]
     print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json, inputs=read)
-    for note in [*notes_of(signals), *_assumed(mapping, proposed)]:
+    for note in [*notes_of(signals), *_assumed(mapping, proposed), *map(_left_out, nearly)]:
         layout.say(f"{note}.")
     if len(changing) < len(others):
         layout.say(f"{len(others) - len(changing)} other signals never change, and are not shown.")
@@ -104,6 +104,17 @@ def _assumed(mapping: Mapping, proposed: list[Candidate]) -> list[str]:
         if unit != each.signal.unit:
             notes.append(f"{each.key} = {each.signal.name} has no unit: {unit} is assumed ({each.why[-1]}); check it")
     return notes
+
+
+def _left_out(each: Candidate) -> str:
+    """Name a signal that may be an input, and how to take it."""
+    from ..signals.units import KINDS
+
+    name, unit = each.signal.name, each.signal.unit
+    lacks = f"is in {unit}" if unit else "has no unit"
+    given = "" if unit else f",unit={KINDS[each.key][1]}"
+    option = f"--map '{each.key}={name}{given}'"
+    return f"{each.key} is not mapped: {name} {lacks}, and may be something else; {option} takes it"
 
 
 def _signals(args: argparse.Namespace, start: float, length: float) -> list[Signal]:

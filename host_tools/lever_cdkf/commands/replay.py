@@ -41,8 +41,9 @@ also holds estimates, of the firmware that ran when it was recorded and by this 
 they are compared with the new ones, signal by signal.
 
 {MAP_HELP}
-The settings are the firmware's defaults, changed by --settings and --set. COMMAND frames in the log are obeyed, except
-for a choice (model, preload, estimator, adaptation, mitigation) that is made here. Mapped signals set sample_period.
+The settings are the firmware's defaults, changed by --settings and --set; `lever tune` finds those of a log. COMMAND
+frames in the log are obeyed, except for a choice (model, preload, estimator, adaptation, mitigation) that is made here.
+Mapped signals set sample_period.
 """
 _EPILOG = """\
 examples:
@@ -55,8 +56,8 @@ examples:
   lever replay flight.blf --dbc aircraft.dbc --map theta=LEVER.Angle z_ddot=IMU.AccZ -o out/flight
   lever replay flight.csv --map theta=angle z_ddot=acc,unit=g -o out/flight
 
-Exit status: 0 when the log was replayed; 1 when the estimator was in fault or published no estimate, with one line on
-standard error.
+Exit status: 0 when the log was replayed, whatever the flags of the estimates say; 1 when the estimator was in mode
+fault or published no estimate, with one line on standard error.
 """
 
 
@@ -230,7 +231,7 @@ def _recording_row(summary: ReplaySummary) -> Row:
         "refused": recording.refused,
         "samples": summary.samples,
         "lost": summary.lost,
-        "corrupt": summary.corrupt,
+        "corrupt or implausible": summary.corrupt,
         "late": summary.late,
         "restarts": summary.restarts,
         "repeated frames": recording.repeated,

@@ -16,7 +16,7 @@ from ..cli.layout import command_lines, say, terminal_width
 from ..cli.tables import Row, Tables, add_json_option
 from ..errors import LeverError
 from ..runtime.extras import require
-from ..runtime.files import check_not_input
+from ..runtime.files import check_not_input, check_writable
 from .signal_options import MAP_HELP, add_signal_options, chosen_reading, input_files
 
 if TYPE_CHECKING:
@@ -137,8 +137,8 @@ def _settings(args: argparse.Namespace) -> Assignments:
     if not 0.0 <= args.held_out <= 0.8:
         raise LeverError(f"--held-out {args.held_out:g}: must be from 0 to 0.8")
     for path in (args.output, args.page):  # before a search whose result could then not be kept
-        if path is not None and not path.parent.is_dir():
-            raise LeverError(f"cannot write {path}: there is no folder {path.parent}")
+        if path is not None:
+            check_writable(path)
     for path in (args.output, args.page, args.json):
         check_not_input(path, args.log)
     if args.start < 0.0 or not args.length > 0.0:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
+from ..errors import LeverError
 from ..runtime.files import check_writable, native_file, whole
 from ..runtime.provenance import created, provenance
 from .binary import compile_library, compiler, headers, library_suffix, platform_tuple
@@ -55,6 +56,8 @@ def core_c(*folders: str) -> dict[str, Path]:
 def check(path: Path) -> None:
     """Raise LeverError for what would fail at the end of write()."""
     check_writable(path)
+    if path.suffix.lower() != ".fmu":
+        raise LeverError(f"cannot write {path}: the name of an FMU ends in .fmu")
     headers()
     compiler()
 

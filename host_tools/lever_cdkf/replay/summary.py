@@ -90,7 +90,7 @@ def failure(summary: ReplaySummary) -> str:
     """Return why a replay did not pass, in a line; empty when it did."""
     reasons = []
     if "fault" in summary.modes_s:
-        reasons.append(f"the estimator was in fault for {summary.modes_s['fault']:g} s")
+        reasons.append(f"the estimator was in mode fault for {summary.modes_s['fault']:g} s, restarted too often")
     if all(estimate.last is None for estimate in summary.estimates.values()):
         accepted, refused = summary.samples, summary.recording.refused
         reasons.append(f"no estimate was published: samples accepted: {accepted:,}, frames refused: {refused:,}")
@@ -156,7 +156,10 @@ def _troubles(summary: ReplaySummary) -> list[str]:
         troubles.append("A COMMAND in the log changes the model on the way; the estimates of the first one are shown.")
     step, period = recording.typical_step_s, summary.estimator.settings["sample_period"]
     if step and not 0.7 < step / period < 1.4:
-        troubles.append(f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: set it.")
+        troubles.append(
+            f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: add "
+            f"--set sample_period={step:.4g}."
+        )
     return troubles + _recorded_estimates(recording)
 
 

@@ -243,7 +243,7 @@ def recording_table(run: Run) -> str:
 RUN_FIGURES = (
     ("samples", "samples", ""),
     ("lost", "lost", "frames"),
-    ("corrupt", "corrupt", "frames"),
+    ("corrupt", "corrupt frames and implausible values", ""),
     ("late", "late", "frames"),
     ("restarts", "restarts of the filter", ""),
     ("unanswered", "samples without an answer", ""),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import LeverError
-from ..numeric.derivative import derivative_ratio
+from ..numeric.derivative import derivative_ratio, in_degrees
 from ..results.summary import MappedSignal
 from ..text.units import GRAVITY
 from .mapping import Source
@@ -56,11 +56,12 @@ def understood(key: str, source: Source, signal: Signal) -> Input:
     notes: list[str] = []
     unit, scale = _scale(key, source, signal, notes)
     values = signal.values * scale + source.offset
-    if key == "z_ddot" and not source.unit and source.factor is None and abs(level_in(values) - 1.0) < 0.15:
-        raise LeverError(
-            f"z_ddot = {name}: it is said to be in {unit}, but rests at {level_in(values):.2f} m/s², as gravity in g "
-            f"does: say unit=g, or unit={unit} if that is right"
-        )
+    if key == "z_ddot" and source.factor is None and abs(level_in(values) - 1.0) < 0.15:
+        level = level_in(values)
+        odd = f"z_ddot = {name}: it is said to be in {unit}, but rests at {level:.2f} m/s², as gravity in g does"
+        if not source.unit:
+            raise LeverError(f"{odd}: say unit=g, or unit={unit} if that is right")
+        notes.append(odd)
     sign, gravity = source.sign or 1, source.gravity
     if key == "z_ddot" and gravity == "auto":
         direction = gravity_in(values)
@@ -137,13 +138,19 @@ def samples_of(inputs: Mapping[str, Input], clock: str | None = None) -> tuple[S
 
 
 def _disagreement(inputs: Mapping[str, Input], samples: Samples) -> list[str]:
-    """Return a note where the angular rate is not the slope of the angle: one of their units or signs is wrong."""
+    """Return a note where the angular rate is not the slope of the angle: one of their signs or factors is wrong.
+
+    Raise LeverError where one of them is in degrees and is taken as radians.
+    """
     if not {"theta", "theta_dot"} <= inputs.keys():
         return []
+    if found := in_degrees(inputs["theta"].signal, inputs["theta_dot"].signal):
+        key, why = found
+        raise LeverError(f"{why}: map {key} with unit={'deg' if key == 'theta' else 'deg/s'}")
     ratio = derivative_ratio(inputs["theta"].signal, inputs["theta_dot"].signal)
     names = f"theta_dot = {inputs['theta_dot'].signal.name} and theta = {inputs['theta'].signal.name}"
     if ratio < 0.0:
         return [f"{names}: the rate is minus the slope of the angle: one of them needs sign=-1"]
     if ratio and not 0.5 < ratio < 2.0:
-        return [f"{names}: the rate is {ratio:.3g} times the slope of the angle: is one of them in another unit?"]
+        return [f"{names}: the rate is {ratio:.3g} times the slope of the angle: one of them is in another unit"]
     return []

@@ -53,7 +53,7 @@ class Source:
     channel: str | None = None
     """The bus; by default the only one that has the message."""
     delay: float = 0.0
-    """By how much it is behind [s]: so much is taken from its time."""
+    """Delay [s], subtracted from its times; negative for a signal that is ahead of the others."""
 
 
 @dataclass(frozen=True)

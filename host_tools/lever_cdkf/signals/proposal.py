@@ -44,6 +44,8 @@ _ELSEWHERE = 0.5
 """Weight of words that are not in the signal's own name, but in its message's and in what the database says of it."""
 _LEAST = {"theta": 2.0, "theta_dot": 2.5, "z_ddot": 3.0, "tau_m": 7.0, "grip_force": 7.0}
 """Score from which on a signal is proposed: a torque of something else is worse than none."""
+_NEARLY = 3.0
+"""A signal that lacks no more than this is named, for a person to decide."""
 
 
 def _weights(text: str) -> dict[str, float]:
@@ -101,8 +103,8 @@ class Candidate:
     why: tuple[str, ...]
 
 
-def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candidate]]:
-    """Return the mapping, and the candidates that it is made of.
+def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candidate], list[Candidate]]:
+    """Return the mapping, the candidates that it is made of, and those that nearly are in it.
 
     Raise LeverError where there is none for lever or base.
     """
@@ -110,6 +112,7 @@ def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candid
     candidates = [_candidate(key, signal) for signal in moving for key in INPUTS]
     candidates = _with_movement(_with_slopes([each for each in candidates if each.score > _HOPELESS]))
     chosen: dict[str, Candidate] = {}
+    nearly: list[Candidate] = []
     for key in INPUTS:
         taken = {each.signal.name for each in chosen.values()}
         if "theta" in chosen:
@@ -117,13 +120,15 @@ def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candid
         best = [each for each in _best(candidates, key) if each.signal.name not in taken and _goes_with(each, chosen)]
         if best and best[0].score >= _LEAST[key] and _is_clear(key, best):
             chosen[key] = best[0]
+        elif best and best[0].score >= _LEAST[key] - _NEARLY:
+            nearly.append(best[0])
     if "z_ddot" not in chosen or not chosen.keys() & {"theta", "theta_dot"}:
         lacking = "an acceleration of the base" if chosen.keys() & {"theta", "theta_dot"} else "the angle of a lever"
         raise LeverError(f"{where}: no signal looks like {lacking}: map it by hand, with --map KEY=SIGNAL")
     proposed = [chosen[key] for key in INPUTS if key in chosen]
     units = {each.key: _unit(each, chosen) for each in proposed}
     sources = {each.key: _source(each, chosen, units[each.key][0]) for each in proposed}
-    return Mapping(sources), [replace(each, why=each.why + units[each.key][1]) for each in proposed]
+    return Mapping(sources), [replace(each, why=each.why + units[each.key][1]) for each in proposed], nearly
 
 
 def _goes_with(each: Candidate, chosen: dict[str, Candidate]) -> bool:
@@ -145,10 +150,7 @@ def _source(each: Candidate, chosen: dict[str, Candidate], unit: str) -> Source:
 
 
 def _unit(each: Candidate, chosen: dict[str, Candidate]) -> tuple[str, tuple[str, ...]]:
-    """Return the unit of a signal.
-
-    Where it has none and a replay could not tell or would be wrong, it is the likely one and why.
-    """
+    """Return the unit of a signal, or where it has none the likely one, and why it is that."""
     if each.signal.unit:
         return each.signal.unit, ()
     if each.key == "z_ddot":
@@ -162,7 +164,8 @@ def _unit(each: Candidate, chosen: dict[str, Candidate]) -> tuple[str, tuple[str
             one = factor(each.key, unit)
             if scale and one and 0.5 < ratio * one / scale < 2.0:
                 return unit, (f"{ratio:.2g} times the slope of {angle.name} as it stands",)
-    return "", ()
+    unit, why = likely(each.key, each.signal.values)
+    return unit, (why,)
 
 
 def words_of(name: str) -> set[str]:

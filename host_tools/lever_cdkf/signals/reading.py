@@ -98,6 +98,7 @@ def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, pro
     reader = BusSignals(database, fields.values(), mapping.protected)
     recording = Recording(paths, translated=False)
     frames, set_back = _collect(reader, recording, reading.start, reading.length, progress)
+    _check_part(frames, reading.start, ", ".join(paths))
     inputs, buses = {}, set[str]()
     for key, source in mapping.sources.items():
         message, signal = fields[key]
@@ -123,6 +124,7 @@ def _of_table(path: str, reading: Reading) -> Loaded:
     inputs = {}
     for key, source in mapping.sources.items():
         signal = column(columns, source.signal, path).between(start, start + reading.length)
+        _check_part(len(signal.time), reading.start, path)
         inputs[key] = understood(key, source, signal)
     samples, notes = recorded_samples(inputs, reading.clock)
     of_file = notes_of(each.signal for each in inputs.values())
@@ -155,6 +157,11 @@ def all_signals(
     if not signals:
         raise LeverError(f"{log}: none of its frames is of a message of {database}: is it the database of this bus?")
     return signals
+
+
+def _check_part(count: int, start: float, where: str) -> None:
+    if start > 0.0 and not count:
+        raise LeverError(f"{where}: there is nothing from {start:g} s on (--start)")
 
 
 def _beginning(columns: Sequence[Signal]) -> float:

@@ -195,6 +195,7 @@ def test_dbc_path(capsys: pytest.CaptureFixture[str]) -> None:
     ("arguments", "text"),
     [
         (["none"], "invalid choice: 'none'"),
+        (["setings"], "invalid choice: 'setings': did you mean settings? (see `lever --help`)"),
         (["--none"], "(see `lever --help`)"),
         (["settings", "more"], "unrecognized arguments: more (see `lever --help`)"),
         (["settings", "--sett", "x"], "unrecognized arguments: --sett x"),

@@ -75,6 +75,7 @@ def test_what_is_wrong_is_one_line(refused: Refused, tmp_path: Path) -> None:
         assert text in refused("fmu", *arguments, "-o", out)
     assert "cannot write" in refused("fmu", "controller", "-o", tmp_path / "none/x.fmu")
     assert "it is a folder" in refused("fmu", "pilot", "-o", tmp_path)
+    assert "the name of an FMU ends in .fmu" in refused("fmu", "controller", "-o", tmp_path / "README.md")
     assert not list(tmp_path.iterdir())
 
 

@@ -317,12 +317,12 @@ def test_settings_that_the_firmware_refuses_are_one_line(session: Session, refus
 @pytest.mark.parametrize(
     ("part", "key", "value", "words"),
     [
-        ("modes_s", "fault", 2.5, "Trouble: the estimator was in fault for 2.5 s."),
+        ("modes_s", "fault", 2.5, "Trouble: the estimator was in mode fault for 2.5 s, restarted too often."),
         ("recording", "ends_early", ["a.log: cut"], "The log is incomplete: a.log: cut."),
         ("recording", "damaged_lines", 3, "3 of its lines are not frames."),
         ("recording", "clock_restarts", 2, "The sender's clock started over 2 times."),
         ("recording", "model_changes", 1, "changes the model on the way"),
-        ("recording", "typical_step_s", 1.41e-3, "Samples come every 1.41 ms, but sample_period is 1 ms: set it."),
+        ("recording", "typical_step_s", 1.41e-3, "is 1 ms: add --set sample_period=0.00141."),
         ("recording", "typical_step_s", 0.69e-3, "Samples come every 0.69 ms"),
     ],
 )

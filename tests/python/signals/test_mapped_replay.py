@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.native import Config, enum_names, enum_words, run_samples
+from lever_cdkf.text.units import GRAVITY
 from python.conftest import Refused
 from python.signals.flight import MAPPED, NATURAL_FREQUENCY, Flight, as_decoded, write_log
 
@@ -151,6 +152,37 @@ def test_too_slow_is_refused(flight: Flight, tmp_path: Path, refused: Refused) -
     said = refused("replay", tmp_path / "slow.csv", "-o", tmp_path / "out")
     assert "every 40 ms (25 Hz); the firmware takes samples from 50 to 10000 Hz" in said
     assert not list(tmp_path.glob("out/*"))
+
+
+@pytest.mark.parametrize("wrong", ["theta", "theta_dot"])
+def test_degrees_that_are_said_to_be_radians_are_refused(
+    wrong: str, flight: Flight, tmp_path: Path, refused: Refused
+) -> None:
+    """Of a lever that moves little, so that the size of neither tells."""
+    values = {name: getattr(flight, name) for name in ("theta", "theta_dot", "z_ddot")}
+    values = {name: value - value.mean() for name, value in values.items()}
+    values["theta_dot"] *= 0.1
+    values["theta"] *= 0.1
+    values[wrong] = np.degrees(values[wrong])
+    np.savez(tmp_path / "log.npz", t=flight.time, **values)
+    units = {"theta": "rad", "theta_dot": "rad/s", "z_ddot": "m/s^2"}
+    mapped = [f"{name}={name},unit={unit}" for name, unit in units.items()]
+    said = refused("replay", tmp_path / "log.npz", "--map", *mapped)
+    assert f"{wrong} looks like degrees: map {wrong} with unit=deg" in said
+
+
+def test_gravity_in_g_that_is_said_to_be_in_si_is_noted(flight: Flight, tmp_path: Path) -> None:
+    np.savez(tmp_path / "log.npz", t=flight.time, theta=flight.theta, z=1.0 + flight.z_ddot / GRAVITY)
+    mapped = ("theta=theta,unit=rad", "z_ddot=z,unit=m/s^2")
+    summary = replayed(tmp_path / "out", tmp_path / "log.npz", "--map", *mapped)
+    assert "it is said to be in m/s^2, but rests at 1.00 m/s², as gravity in g does." in summary["verdict"]
+
+
+@pytest.mark.parametrize("log", ["columns.csv", "flight.blf", "flight.log"])
+def test_a_part_behind_the_end(log: str, folder: Path, refused: Refused) -> None:
+    mapped = COLUMNS if log == "columns.csv" else ("--dbc", folder / "foreign.dbc", "--map", *MAPPED)
+    arguments = ("--map", *mapped) if log == "columns.csv" else mapped
+    assert "there is nothing from 100 s on (--start)" in refused("replay", folder / log, *arguments, "--start", "100")
 
 
 def test_a_part(folder: Path, tmp_path: Path) -> None:

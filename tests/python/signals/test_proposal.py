@@ -101,6 +101,7 @@ def test_what_has_no_unit_is_proposed_with_one(
         "lever_angle": 0.3 + theta,
         "lever_rate": theta_dot * (1.0 if rate == "rad/s" else 180.0 / np.pi),
         "floor_acc": base / (1.0 if unit == "m/s^2" else 9.80665),
+        "Motormoment": 0.3 * np.sin(20.0 * time),
     }
     log = tmp_path / "flight.csv"
     rows = (",".join(f"{value:.6f}" for value in row) for row in zip(*columns.values(), strict=True))
@@ -109,9 +110,11 @@ def test_what_has_no_unit_is_proposed_with_one(
     said = capsys.readouterr().out
     assert f"z_ddot = floor_acc has no unit: {unit} is assumed (" in said
     assert f"theta_dot = lever_rate has no unit: {rate} is assumed (" in said
+    assert "theta = lever_angle has no unit: rad is assumed (" in said
+    assert "tau_m is not mapped: Motormoment has no unit" in said
     (command,) = (line for line in said.splitlines() if line.startswith("lever replay"))
     assert main(shlex.split(command)[1:]) == 0
-    assert "is one of them in another unit" not in capsys.readouterr().out
+    assert "one of them is in another unit" not in capsys.readouterr().out
 
 
 def test_a_signal_that_begins_later_is_drawn_later(tmp_path: Path) -> None:
