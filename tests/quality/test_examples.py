@@ -17,7 +17,7 @@ NOT_RUN = {
     r"wireshark -C": "needs a display",
     r"lever (live|monitor)(?!.*--once)": "runs until it is ended",
     r"lever (flash|qemu)": "needs the image, with which pages of firmware/port run it",
-    r"lever (compare --(out|quick|envelope)|(envelope|bounce|faults) --json|figures --(out|campaign))": "takes minutes",
+    r"lever (compare --(out|quick|envelope)|(envelope|bounce|faults) -o|figures (-o|--campaign))": "takes minutes",
     r"lever soak --json": "takes minutes",
     r"model\.mat": "needs a user's own; sil/lever_sil/aircraft/README.md makes and flies one",
     r"lever (bounce|envelope|faults) --quick": "is what tests/python/{bounce,envelope,faults} do",

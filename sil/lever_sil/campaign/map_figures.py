@@ -41,7 +41,8 @@ _QUANTITIES = (
     ),
     _Quantity(
         "nees", "NEES", "NEES (expected 3)", statistics.nees, 1.0, (0.0, 12.0),
-        "Normalised squared error of the three parameters: 3 is right, more is over-confident.",
+        "Normalised squared error of the three parameters: 3 is right, more is over-confident; empty for an estimator "
+        "without standard deviations.",
     ),
     _Quantity(
         "settled", "Settling", "settling time [s]", statistics.settled, 1.0, (0.0, 60.0),
@@ -49,7 +50,8 @@ _QUANTITIES = (
     ),
     _Quantity(
         "flagged", "Flagged", "flagged [%]", statistics.flagged, 100.0, (0.0, 100.0),
-        "Share of the time with a fault that says that the estimates are not to be trusted.",
+        "Share of the time with a fault that says that the estimates are not to be trusted; empty for an estimator "
+        "without faults.",
     ),
 )  # fmt: skip
 

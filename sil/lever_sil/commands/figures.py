@@ -42,9 +42,9 @@ _EPILOG = """\
 examples:
   lever figures --list
   lever figures -o out/figures
-  lever figures -o out/figures --only bode grip --seed 7
-  lever figures -o out/figures --campaign out/quick        beside the maps of this campaign
-  lever figures -o out/paper --paper                       the five figures of the paper, by their numbers
+  lever figures --only bode grip --seed 7 -o out/figures
+  lever figures --campaign out/quick -o out/figures        beside the maps of this campaign
+  lever figures --paper -o out/paper                       the five figures of the paper, by their numbers
 """
 
 

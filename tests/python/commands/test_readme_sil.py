@@ -10,6 +10,7 @@ from lever_cdkf.cli.main import main
 from lever_sil.commands import sim
 from lever_sil.plants import excitation, trajectories
 from lever_sil.scenarios import scenario
+from readmes import blocks
 
 
 def test_every_kind_and_every_key_is_described(root: Path) -> None:
@@ -18,6 +19,12 @@ def test_every_kind_and_every_key_is_described(root: Path) -> None:
         assert f"`{kind}` (" in text, kind
     for key in scenario.Scenario.__dataclass_fields__.keys() - {"name", "file"}:
         assert re.search(rf"`\[*{key}\b", text), key
+
+
+@pytest.mark.parametrize("page", ["README.md", "SIL.md"])
+def test_the_example_in_python_keeps_the_limits(page: str, root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    exec(next(iter(blocks(root / "sil" / page, "python").values())), {})
+    assert capsys.readouterr().out.startswith("All limits kept.")
 
 
 def test_help_shows_a_line_for_each_file(capsys: pytest.CaptureFixture[str]) -> None:

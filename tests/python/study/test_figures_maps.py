@@ -93,6 +93,13 @@ def test_the_page_has_every_value_and_the_line_inside_the_map(tmp_path: Path) ->
     assert list(figures(read(tmp_path / "page.html"))) == ["map-0"]
 
 
+def test_a_map_without_values_has_its_axes() -> None:
+    empty = Chart(np.full((2, 3), np.nan), None)
+    spec = plotted.map_spec(replace(map_figure(), rows=("rls",), columns=Scale("", ("",)), charts=((empty,),)))
+    assert spec["layout"]["xaxis"]["range"] == pytest.approx([-2.5, 0.5])  # decades
+    assert spec["layout"]["yaxis"]["range"] == pytest.approx([-0.5, 1.5])
+
+
 def test_the_table_has_cells_and_border() -> None:
     rows = list(csv.DictReader(data.table(map_figure()).splitlines()))
     assert len(rows) == 8 * (6 + 2)

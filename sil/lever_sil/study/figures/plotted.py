@@ -144,6 +144,8 @@ def _map_axis(scale: Scale, *, ticks: bool, label: bool = False) -> chart.Spec:
     places, shown = _places(scale), scale.ticks(TICKS)
     more: dict[str, Any] = {"showticklabels": ticks, "showgrid": False, "zeroline": False, "ticks": ""}
     more |= {"tickvals": places[shown].tolist(), "ticktext": [written(scale.values[index]) for index in shown]}
+    edges = np.sort(scale.edges[[0, -1]])  # also where nothing is drawn
+    more["range"] = (edges / math.log(10.0) if scale.is_log else edges).tolist()
     if scale.is_log:
         more["type"] = "log"
     return chart.axis(html.escape(scale.label) if label else "", **more)
