@@ -95,6 +95,7 @@ def header() -> str:
 
 
 def main(arguments: list[str]) -> int:
+    """Write golden.h."""
     text = header()
     if "--check" in arguments:
         return int(HEADER.read_text(encoding="utf-8") != text)

@@ -20,6 +20,8 @@ IN_RAM = (".stack", ".data", ".bss", ".noinit")
 
 
 class Section(NamedTuple):
+    """A section of the image."""
+
     size: int
     load_address: int
 
@@ -49,6 +51,7 @@ def put_crc(elf: Path, objcopy: str, objdump: str) -> None:
 
 
 def report(elf: Path, objdump: str) -> str:
+    """Return what the image takes of flash and RAM [bytes], in a line."""
     by_name = sections(elf, objdump)
     flash = sum(by_name[name].size for name in IN_FLASH)
     ram = sum(by_name[name].size for name in IN_RAM)
@@ -60,6 +63,7 @@ def report(elf: Path, objdump: str) -> str:
 
 
 def main() -> None:
+    """Put the checksum into the image, write it as .hex and .bin too, and print what it takes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("elf", type=Path)
     parser.add_argument("--objcopy", default="arm-none-eabi-objcopy")

@@ -35,6 +35,7 @@ class Identifiers(NamedTuple):
 
     @property
     def are_those_of_the_dbc(self) -> bool:
+        """Whether no identifier is shifted or extended."""
         return self == Identifiers()
 
 
@@ -68,6 +69,7 @@ def use(args: argparse.Namespace) -> None:
 
 
 def chosen() -> Identifiers:
+    """Return how this process shifts identifiers."""
     return _chosen
 
 

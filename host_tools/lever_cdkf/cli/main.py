@@ -74,6 +74,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(allow_abbrev=False, **kwargs)
 
     def error(self, message: str) -> NoReturn:
+        """Raise LeverError with one line, instead of printing the usage."""
         if choice := re.fullmatch(r"(.*invalid choice: )('.*') \(choose from (.*)\)", message):
             names = [name.strip("' ") for name in choice[3].split(",")]
             message = did_you_mean(choice[2].strip("'"), names, "")

@@ -31,6 +31,7 @@ examples:
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever dbc`."""
     parser = subparsers.add_parser(
         "dbc",
         help="the CAN messages and signals, with units",
@@ -51,6 +52,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever dbc`; return the exit status."""
     from ..cli.tables import print_tables
     from ..runtime.files import native_file
 

@@ -57,6 +57,7 @@ examples:
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever flash`."""
     parser = subparsers.add_parser(
         "flash",
         help="write the firmware into an STM32F405, with OpenOCD or pyOCD",
@@ -101,6 +102,7 @@ TOOLS = {"openocd": openocd, "pyocd": pyocd}
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever flash`; return the exit status."""
     from ..board.firmware_image import flash_contents
 
     image = args.image or _default_image()

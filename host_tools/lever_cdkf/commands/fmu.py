@@ -49,6 +49,7 @@ multiple (logStatusDiscard), an input that was never set (logStatusWarning). Fau
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever fmu`."""
     parser = subparsers.add_parser(
         "fmu", help="FMUs of the estimator and of a simulated pilot", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -81,6 +82,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever fmu`; return the exit status."""
     from ..firmware.settings_file import make_config, parse_assignment, read_assignments
     from ..fmu import archive
     from ..fmu.controller import controller

@@ -40,6 +40,7 @@ _SPARK = 40
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever map`."""
     parser = subparsers.add_parser(
         "map", help="propose which signals of any log are the inputs", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -56,6 +57,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever map`; return the exit status."""
     from ..cli.tables import print_tables
     from ..runtime.files import write_text
     from ..runtime.provenance import provenance

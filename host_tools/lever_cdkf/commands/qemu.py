@@ -34,6 +34,7 @@ Exit status: that of COMMAND; without one 130, after Ctrl-C.
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever qemu`."""
     parser = subparsers.add_parser(
         "qemu",
         usage="lever qemu [-h] [--machine NAME] [--icount] IMAGE [-- COMMAND...]",
@@ -62,6 +63,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever qemu`; return the exit status."""
     from ..board.qemu import one_processor, running
 
     command = args.command[1:] if args.command[:1] == ["--"] else args.command

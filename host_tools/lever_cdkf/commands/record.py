@@ -42,6 +42,7 @@ Exit status: 0 when FILE is complete (losses on the bus are reported, but are no
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever record`."""
     parser = subparsers.add_parser(
         "record", help="record a CAN bus into a log, with losses counted", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -53,6 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever record`; return the exit status."""
     from ..can.recorder import Recorder
     from ..cli.tables import print_tables
     from ..runtime.files import write_text

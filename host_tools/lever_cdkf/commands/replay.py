@@ -62,6 +62,7 @@ fault or published no estimate, with one line on standard error.
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever replay`."""
     parser = subparsers.add_parser(
         "replay", help="run the firmware on recorded CAN logs", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -96,6 +97,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever replay`; return the exit status."""
     from ..cli.progress import Progress
     from ..cli.tables import print_tables
     from ..replay.engine import replay

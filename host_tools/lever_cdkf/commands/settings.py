@@ -25,6 +25,7 @@ examples:
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever settings`."""
     parser = subparsers.add_parser(
         "settings",
         help="the estimator's settings, with units and ranges",
@@ -43,6 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever settings`; return the exit status."""
     from ..cli.tables import print_tables, write_json
     from ..firmware.settings_file import format_config, make_config, parse_assignment, read_assignments
 

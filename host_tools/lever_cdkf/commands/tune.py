@@ -65,6 +65,7 @@ the log does not go with the model, so that neither calibration nor walks can be
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parser of `lever tune`."""
     parser = subparsers.add_parser(
         "tune", help="settings from a log, by maximum likelihood", description=_DESCRIPTION, epilog=_EPILOG
     )
@@ -96,6 +97,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
+    """Run `lever tune`; return the exit status."""
     require("tune")
     if args.page is not None:
         require("report")

@@ -65,6 +65,7 @@ PORT = 8642
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
+    """Add the parsers of `lever monitor` and `lever live`."""
     monitor = subparsers.add_parser(
         "monitor", help="watch the estimator in the terminal", description=_MONITOR, epilog=_MONITOR_EPILOG
     )

@@ -20,6 +20,7 @@ class Detrend:
 
     @property
     def level(self) -> float:
+        """The slow level, in the unit of the signal."""
         return sum(self._levels)
 
     def rate(self, deviation: float, corner: float) -> float:

@@ -74,6 +74,7 @@ class LinearPhysical(Linear):
     """Mass, damper and spring on an accelerated base."""
 
     def coefficients(self, p: Array, u: Inputs) -> tuple[Array, Array, Array]:
+        """Return stiffness k [1/s²], damping c [1/s] and drive [rad/s²] of x¨ + c x˙ + k x = drive."""
         m, c, k = p
         return k / m, c / m, u[0] + u[1] / m
 
@@ -82,6 +83,7 @@ class LinearBlackBox(Linear):
     """A second-order system in controllable form."""
 
     def coefficients(self, p: Array, u: Inputs) -> tuple[Array, Array, Array]:
+        """Return stiffness k [1/s²], damping c [1/s] and drive [rad/s²] of x¨ + c x˙ + k x = drive."""
         a21, a22, b21 = p
         return -a21, -a22, b21 * u[0]
 
@@ -101,9 +103,11 @@ class Hand(Linear):
         return cls(settings["lever_preload_angle"], preload, lever.length, inertia)
 
     def step(self, x: Array, p: Array, u: Inputs, trim: float | Array, dt: float) -> Array:
+        """Return the state [rad, rad/s] after dt [s]."""
         of_d = -1.0 / (self.length * np.maximum(np.cos(trim), COSINE_LEAST))
         return super().step(x, p, (of_d * u[0] + u[1] / self.inertia, of_d * u[2]), trim, dt)
 
     def coefficients(self, p: Array, u: Inputs) -> tuple[Array, Array, Array]:
+        """Return stiffness k [1/s²], damping c [1/s] and drive [rad/s²] of x¨ + c x˙ + k x = drive."""
         k, c, c_space = p
         return k, c, u[0] + c_space * u[1]

@@ -19,9 +19,12 @@ class Signal(Protocol):
     """Values at times [s], which rise."""
 
     @property
-    def time(self) -> FloatArray: ...
+    def time(self) -> FloatArray:
+        """[s], rising."""
+
     @property
-    def values(self) -> FloatArray: ...
+    def values(self) -> FloatArray:
+        """One for each time."""
 
 
 def in_degrees(theta: Signal, theta_dot: Signal) -> tuple[str, str] | None:

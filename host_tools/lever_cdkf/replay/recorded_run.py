@@ -66,17 +66,21 @@ class RecordedRun(Run):
 
     @property
     def samples(self) -> int:
+        """Number of samples."""
         return self._kept.samples
 
     @property
     def end(self) -> float:
+        """Time of the last sample [s]."""
         return self._kept.end
 
     @cached_property
     def sample_period(self) -> float:
+        """[s]."""
         return self._kept.sample_period
 
     def close_up(self, start: float, seconds: float) -> Mapping[str, FloatArray]:
+        """Return the columns of the trace near a time [s]."""
         return self._kept.ends.near(start)
 
     def innovations(self, seconds: float) -> Averages | None:
@@ -90,18 +94,22 @@ class RecordedRun(Run):
         return Averages(time.mean(axis=1), total.sum(axis=1), outputs.sum(axis=1), together * _NIS_AVERAGE)
 
     def spectrum(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Return frequencies [Hz] and power spectral density of a column [unit²/Hz]."""
         return self._kept.spectra[name].spectrum()
 
     @cached_property
     def feedthrough(self) -> Feedthrough:
+        """Estimated feedthrough over the recording."""
         return self._kept.feedthrough
 
     @cached_property
     def test_ratios(self) -> TestRatios:
+        """Statistics of the evidence over their thresholds [1]."""
         return self._kept.test_ratios
 
     @cached_property
     def coherence(self) -> Coherence:
+        """Coherence of base and lever by frequency."""
         return self._kept.coherence
 
     @cached_property

@@ -138,6 +138,7 @@ class Figure:
 
 
 def time_axis(end: float) -> Spec:
+    """Return an axis from 0 to `end` [s]."""
     return axis("time [s]", range=[0.0, end], unifiedhovertitle={"text": "%{x:.2f} s"})
 
 
@@ -149,4 +150,5 @@ def frequency_axis(low: float, high: float) -> Spec:
 
 
 def axis(title: str, **more: Any) -> Spec:
+    """Return an axis with a title, and what else plotly knows."""
     return {"title": {"text": title}, **more}

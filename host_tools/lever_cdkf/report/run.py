@@ -63,12 +63,15 @@ class Run:
         return next((name for name in names if self.column(name) is not None), None)
 
     def truth(self, quantity: Quantity) -> Array | None:
+        """Return the true values of a quantity; None where they are not known."""
         return self.column(quantity.column("true"))
 
     def estimate(self, quantity: Quantity) -> Array | None:
+        """Return the estimates of a quantity; None without any."""
         return self.column(quantity.column("estimate"))
 
     def sigma(self, quantity: Quantity) -> Array | None:
+        """Return their standard deviations; None without any."""
         return self.column(quantity.column("sigma"))
 
     @cached_property
@@ -90,6 +93,7 @@ class Run:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
+        """What the model estimates."""
         return quantities.quantities(self.model)
 
     @cached_property
@@ -189,6 +193,7 @@ class Run:
 
     @property
     def end(self) -> float:
+        """Time of the last sample [s]."""
         return float(self.time[-1])
 
     @cached_property
@@ -232,6 +237,7 @@ class Run:
 
     @cached_property
     def lever(self) -> Lever:
+        """The lever of the settings."""
         return Lever.from_settings(self.settings, self.summary.estimator.preload if self.summary else "trim")
 
 

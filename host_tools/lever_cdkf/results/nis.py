@@ -50,6 +50,7 @@ class Innovations:
         self._inside += int(np.sum(nis <= np.where(outputs == 2, CHI_SQUARE_95[2], CHI_SQUARE_95[1])))
 
     def figures(self) -> Nis:
+        """Return mean, band and share of what was added."""
         if not self._count:
             return Nis()
         expected = self._freedom / self._count

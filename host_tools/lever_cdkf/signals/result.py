@@ -46,6 +46,7 @@ class Estimated:
 
     @property
     def last_sigma(self) -> float:
+        """Standard deviation at the end."""
         return float(self.sigma[-1])
 
     def __str__(self) -> str:

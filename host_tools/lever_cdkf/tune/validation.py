@@ -66,10 +66,12 @@ class Gain:
 
     @property
     def is_better(self) -> bool:
+        """Whether it is more than chance."""
         return self.mean > _CLEAR * self.error
 
     @property
     def is_worse(self) -> bool:
+        """Whether it is a loss that is more than chance."""
         return self.mean < -_WORSE * self.error
 
     def __str__(self) -> str:

@@ -28,6 +28,7 @@ class MappedLog:
         self.damaged, self.ends_early = self._traffic.recording.damaged, self._traffic.recording.ends_early
 
     def chunks(self) -> Iterator[Frames]:
+        """Yield the frames that the mapped signals are as, in recorded order."""
         feeder = Feeder(self._estimator)
         for frames in self._traffic.chunks():
             for fed, _ in feeder.feed(frames):

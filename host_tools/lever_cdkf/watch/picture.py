@@ -136,6 +136,7 @@ class Picture:
         return math.inf if heard is None else self.now - heard
 
     def is_fresh(self, name: str) -> bool:
+        """Return whether a message has come within STALE_AFTER."""
         return self.age(name) <= STALE_AFTER
 
     def silence(self) -> float:

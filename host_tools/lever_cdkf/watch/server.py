@@ -181,6 +181,7 @@ class Page(_Guarded):
     """The files of the page."""
 
     def get(self, name: str) -> None:
+        """Answer with a file of the page; 404 for any other."""
         if name not in _FILES:
             raise tornado.web.HTTPError(404)
         file, kind = _FILES[name]
@@ -197,10 +198,12 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
     _sending: asyncio.Future[None] | None = None
 
     def initialize(self, server: Server) -> None:
+        """Begin the connection of a page."""
         super().initialize(server)
         self._commanded = _Throttle(_MOST_COMMANDS, "a page")
 
     def prepare(self) -> None:
+        """Refuse what another page asks."""
         super().prepare()
         origin = self.request.headers.get("Origin")
         if origin is not None and urlsplit(origin).netloc.lower() != self.request.headers["Host"].lower():
@@ -211,11 +214,13 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
         return True
 
     def open(self, *_: str, **__: str) -> None:
+        """Tell a new page the state."""
         self.set_nodelay(True)
         self.tell(self.server.state.start())
         self.server.pages.add(self)
 
     def on_close(self) -> None:
+        """Forget the page."""
         self.server.pages.discard(self)
 
     def update(self, messages: list[str]) -> None:
@@ -232,6 +237,7 @@ class Channel(_Guarded, tornado.websocket.WebSocketHandler):
             self.tell(message)
 
     def tell(self, message: str) -> None:
+        """Send a message without waiting for the page."""
         self._sending = asyncio.ensure_future(self._send(message))
 
     async def _send(self, message: str) -> None:

@@ -87,6 +87,7 @@ class Source(ABC):
         """Put frames until self._stopping is set or none are left. Raises what went wrong."""
 
     def start(self) -> None:
+        """Begin to receive, in a thread."""
         self._switch_interval = sys.getswitchinterval()
         sys.setswitchinterval(_SWITCH_INTERVAL)
         self._start = time.monotonic()
@@ -203,6 +204,7 @@ class BusSource(Source):
         _widen(self._bus)
 
     def run(self) -> None:
+        """Receive until stop() is called."""
         receive, put, stopping = self._bus.recv, self._put, self._stopping
         while not stopping.is_set():
             message = receive(_LISTEN)
@@ -210,6 +212,7 @@ class BusSource(Source):
                 put(as_frame(message))
 
     def stop(self) -> None:
+        """End the thread and close the bus."""
         super().stop()
         self._bus.shutdown()
 
@@ -237,7 +240,8 @@ class PlayedLog(Protocol):
     damaged: int
     ends_early: list[str]
 
-    def chunks(self) -> Iterator[Frames]: ...
+    def chunks(self) -> Iterator[Frames]:
+        """Yield frames in recorded order."""
 
 
 class LogSource(Source):
@@ -260,6 +264,7 @@ class LogSource(Source):
         self._part = part
 
     def run(self) -> None:
+        """Receive until stop() is called."""
         due = time.monotonic()
         for pause, frame in self._frames():
             due += pause

@@ -60,6 +60,7 @@ class Monitor(App[None]):
         self._panels = {name: Vertical(table, id=name, classes="panel") for name, table in self._tables.items()}
 
     def compose(self) -> ComposeResult:
+        """Yield the widgets, from top to bottom."""
         yield from self._lines.values()
         yield self._panels["estimates"]
         yield self._panels["feedthrough"]
@@ -67,6 +68,7 @@ class Monitor(App[None]):
         yield Footer()
 
     def on_mount(self) -> None:
+        """Start the source and the timers."""
         for name, panel in self._panels.items():
             panel.border_title = name
         self.source.start()
@@ -75,12 +77,14 @@ class Monitor(App[None]):
             self.set_timer(self._duration, self.exit)
 
     def on_resize(self, event: Resize) -> None:
+        """Fit the panels to the height."""
         is_tall = event.size.height >= TALL
         self._lines["condition"].styles.max_height = 2 if is_tall else 1  # the panel health has it all
         if not self._feedthrough_chosen:
             self._panels["feedthrough"].display = is_tall
 
     def on_unmount(self) -> None:
+        """Stop the source."""
         self.source.stop()
 
     def advance(self) -> None:
@@ -90,6 +94,7 @@ class Monitor(App[None]):
             self.draw()
 
     def draw(self) -> None:
+        """Show the picture."""
         picture, source, tables = self.picture, self.source, self._tables
         self._lines["headline"].update(panels.headline(picture, source))
         self._lines["condition"].update(panels.condition(picture, source))
@@ -119,5 +124,6 @@ class Monitor(App[None]):
         self.draw()
 
     def action_clear(self) -> None:
+        """Set the counters to zero."""
         self.picture.clear_counts()
         self.draw()
