@@ -95,7 +95,7 @@ def header() -> str:
 
 
 def main(arguments: list[str]) -> int:
-    """Write golden.h."""
+    """Write golden.h, or with --check only compare it; return the exit status."""
     text = header()
     if "--check" in arguments:
         return int(HEADER.read_text(encoding="utf-8") != text)

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ..cli.tables import Row
+from ..cli.tables import Cell, Row
 from ..firmware import native
 from ..firmware.quantities import DYNAMICS, LEAST_COVERAGE, Quantity
 from ..results import trust
@@ -154,8 +154,17 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def rows_table(rows: Sequence[Row], digits: int = 4) -> str:
     """Return rows as commands print them, numbers with so many digits; nothing without rows."""
-    cells = ([html.escape(number(cell, digits)) for cell in row.values()] for row in rows)
-    return table([html.escape(column) for column in rows[0]], cells) if rows else ""
+    if not rows:
+        return ""
+    prose = [
+        name for name in list(rows[0])[1:] if any(" " in cell for row in rows if isinstance(cell := row[name], str))
+    ]
+
+    def shown(name: str, cell: Cell) -> str:
+        text = html.escape(number(cell, digits))
+        return f'<span class="words">{text}</span>' if name in prose else text
+
+    return table([shown(name, name) for name in rows[0]], ([shown(*cell) for cell in row.items()] for row in rows))
 
 
 def errors_table(run: Run) -> str:
