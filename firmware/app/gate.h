@@ -8,7 +8,7 @@
 
 #include <stdbool.h>
 
-#define GATE_SIGMA 8.0f      /* standard deviations [spikes] */
+#define GATE_SIGMA 8.0f      /* standard deviations */
 #define GATE_TIME 0.02f      /* [s] */
 #define GATE_MEMORY 1.0f     /* of the usual change of an input [s] */
 #define GATE_COUNTED 0.0625f /* part of the limit that a refused change counts as, so that it hardly raises the mean */

@@ -3,7 +3,7 @@
 #include "math/invariant.h"
 #include "math/share.h"
 
-#define KEEP_PERIOD 1.0f      /* [s] [base_sign] */
+#define KEEP_PERIOD 1.0f      /* between two copies of the belief [s] */
 #define DISTURBANCE 2.0f      /* process noise when the torque is unknown, in noise_range times the one that is set */
 #define DISTURBANCE_TIME 0.4f /* its time constant [s] [hands_off] */
 #define NOISE_WINDOW 0.15f    /* of noise_window while noise has grown [rough_begins] */

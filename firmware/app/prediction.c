@@ -11,7 +11,7 @@
 #define STOP_RATE 0.002f  /* friction is at half of its limit [rad/s] */
 #define RATE_MOST 1.0e4f  /* [rad/s] */
 #define REST_RATE 6.0f    /* of the mean of the trim angle, which itself follows motion of 1 to 3 Hz in full [1/s] */
-#define JUMP 0.03f        /* of the angle while it was refused, which the rate does not explain [rad] [theta_step] */
+#define JUMP 0.03f        /* of the angle while it was refused, which the rate does not explain [rad] */
 #define SUBSTEPS_MOST 12u /* predictions through a gap: bounds the time of one call */
 
 /* Torque of one newton metre of Coulomb friction, smooth about standstill. Of a rate that is none it is none: what is

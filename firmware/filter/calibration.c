@@ -7,7 +7,7 @@
 
 #define CALIBRATION_MEMORY 20.0f /* [s] */
 #define STATED 2.0f              /* an error may be so many standard deviations of what is stated, */
-#define NOISE 4.0f               /* and so many of those of the innovations [rough] */
+#define NOISE 4.0f               /* and so many of those of the innovations [base_gain_up, angle_gain] */
 #define LIMIT_MIN 1.0e-9f        /* information underflows to 0 before the vector does */
 
 void calibration_start(calibration_t *calibration)
