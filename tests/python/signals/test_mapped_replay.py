@@ -9,6 +9,7 @@ from typing import Any
 import can
 import numpy as np
 import pytest
+from lever_cdkf.can import codec
 from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.native import Config, enum_names, enum_words, run_samples
 from lever_cdkf.text.units import GRAVITY
@@ -80,6 +81,18 @@ def test_columns_of_a_csv(folder: Path, flight: Flight, tmp_path: Path) -> None:
     summary = replayed(tmp_path, folder / "columns.csv", "--map", *COLUMNS)
     assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
     assert frequency(summary) == pytest.approx(fed_directly(flight), rel=1e-3)
+
+
+@pytest.mark.parametrize("has_grip", [False, True])
+def test_a_grip_force_is_fed_where_it_is_mapped(has_grip: bool, flight: Flight, tmp_path: Path) -> None:
+    grip = 20.0 * np.sin(25.0 * flight.time)
+    np.savez(tmp_path / "log.npz", t=flight.time, theta=flight.theta, z=flight.z_ddot, grip=grip)
+    mapped = ["theta=theta,unit=rad", "z_ddot=z,unit=m/s^2", *(["grip_force=grip,unit=N"] if has_grip else [])]
+    replayed(tmp_path / "out", tmp_path / "log.npz", "--map", *mapped)
+    identifier = codec.message("GRIP_SAMPLE").frame_id
+    frames = [message for message in can.LogReader(tmp_path / "out/bus.log") if message.arbitration_id == identifier]
+    fed = [codec.decode(identifier, message.data)[1]["grip_force"] for message in frames]
+    assert fed == pytest.approx(grip if has_grip else [], abs=0.05)
 
 
 def test_what_the_estimator_warns_of_is_said(flight: Flight, tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ from lever_sil.study.compare.entrants import entrants, tuning_name, wrongly_tune
 from lever_sil.study.compare.evaluation import Row
 from lever_sil.study.compare.run_cases import Outcome, Results
 from lever_sil.study.data import Batch, Estimates
+from lever_sil.study.figures import printed as sheets
 from numpy.typing import NDArray
 from python.conftest import Refused, Run
 from python.report.reading import Reader, figures, unpack
@@ -593,6 +594,13 @@ def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.Monkey
     alone = run_cases.run(run_cases.tasks(["lever_fixed_dither_rough"], ["joint"], Plan(2, 3.0)), 1)
     (row,) = evaluation.judge(alone)
     assert float(walk["linearised_natural_frequency"]) == row.linearised[3]
+
+
+def test_a_logarithmic_axis_is_one_in_print() -> None:
+    figure = drawing.Figure([drawing.axis("y")], drawing.axis("x", type="log"), 200, over_time=False)
+    figure.add(drawing.line(np.array([0.1, 1.0, 10.0]), np.ones(3), "name", "estimate"))
+    (axes,) = sheets.charts([("", figure.spec())], 3.0, "double").axes
+    assert axes.get_xscale() == "log"
 
 
 def test_a_figure_for_print_is_what_the_page_shows() -> None:

@@ -48,6 +48,13 @@ def test_no_label_lies_on_another(width: str) -> None:
     assert upper.get_xlim() == lower.get_xlim()
 
 
+@pytest.mark.parametrize("more_is_better", [False, True])
+def test_what_is_better_is_bright(more_is_better: bool) -> None:
+    spec = plotted.map_spec(replace(map_figure(), more_is_better=more_is_better))
+    maps_shown = [trace for trace in spec["data"] if trace["type"] == "heatmap"]
+    assert {trace["reversescale"] for trace in maps_shown} == {not more_is_better}  # of Viridis, bright at its end
+
+
 def test_of_many_values_four_are_written_with_both_ends() -> None:
     steps = Scale("noise [mrad]", tuple(float(value) for value in range(1, 11)))
     chart = Chart(np.ones((10, 3)), None)
