@@ -98,7 +98,8 @@ def test_tables_say_what_the_summary_says(page: Reader, result: SimulationResult
     values = {row[0]: row[1] for row in run[1:]}
     summary = result.summary
     assert {label: first_number(values[label]) for label in list(values)[4:12]} == {
-        "samples": summary.samples, "lost": summary.lost, "corrupt": summary.corrupt, "late": summary.late,
+        "samples": summary.samples, "lost": summary.lost,
+        "corrupt frames and implausible values": summary.corrupt, "late": summary.late,
         "restarts of the filter": summary.restarts, "samples without an answer": summary.unanswered,
         "estimates of other samples": summary.misplaced, "simulated time": summary.simulated_time_s,
     }  # fmt: skip
