@@ -141,9 +141,12 @@ void evidence_add_outputs(evidence_t *evidence, const float y[CDKF_OUTPUTS], boo
     for (uint32_t i = 0u; i < 2u; i++) {
         of->passed[i] = on ? ((1.0f - turn) * (of->passed[i] + change[i])) : 0.0f;
         of->level[i] = on ? (of->level[i] + (turn * (of->passed[i] - of->level[i]))) : 0.0f;
-        of->last[i] = both ? y[i] : 0.0f; /* of an output that is not valid, y may be NaN */
     }
     evidence->paired = both;
+    if (both) { /* y of an output that is not valid may be NaN */
+        of->last[0] = y[0];
+        of->last[1] = y[1];
+    }
 }
 
 void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time)

@@ -1,7 +1,5 @@
 #include "filter/calibration.h"
 
-#include "math/bounds.h"
-
 #include <math.h>
 #include <string.h>
 
@@ -26,8 +24,10 @@ float calibration_step(calibration_t *calibration, const cdkf_t *cdkf, float per
         sum->information = (keep * sum->information) + score.information;
         /* vector = information b + noise of variance information */
         const float limit =
-            (STATED * (cdkf->considered_sigma[c] * sum->information)) + (NOISE * sqrtf(sum->information));
-        largest = greater(largest, fabsf(sum->vector) / greater(limit, LIMIT_MIN));
+            (STATED * (cdkf->considered_sigma[c] * sum->information)) + (NOISE * sqrtf(sum->information)) + LIMIT_MIN;
+        if (fabsf(sum->vector) > (largest * limit)) {
+            largest = fabsf(sum->vector) / limit;
+        }
     }
     return largest;
 }

@@ -365,9 +365,9 @@ TEST(rough_air_that_begins_in_flight_is_noise_and_no_change)
 TEST(with_other_noise_calibration_is_judged_anew)
 {
     random_source_t source = {77u};
-    evidence_t *evidence = &lever->estimator.learning.evidence;
     start_with(0u, (uint8_t)LEVER_ADAPTATION_ROBBINS_MONRO);
     (void)run(10000u);
+    evidence_t *evidence = &lever->estimator.learning.evidence;
     const float *vector = &evidence->calibration.score[CDKF_BASE_GAIN].vector;
     evidence->calibration.score[CDKF_BASE_GAIN].vector = 1.0e9f;
     for (uint32_t ms = 0u; (ms < 8000u) && (*vector > 1.0e6f); ms++) {
