@@ -72,7 +72,8 @@ def test_a_session(desktop: Browser, start_lever: Start) -> None:
     url = address(process)
     desktop.open(url)
     desktop.wait(f"{CONDITION}.startsWith('run')")
-    desktop.wait("document.querySelector('#estimates td').nextElementSibling.textContent != '–'")
+    # The standard deviations come in frames of their own, after those of the values.
+    desktop.wait("Array.from(document.querySelectorAll('#estimates .sigma'), e => e.textContent).every(Boolean)")
     shown = estimates(desktop)
     assert list(shown) == ["mp mass", "cp damping", "kp stiffness", "fn natural frequency", "ζ damping ratio"]
     value, sigma, unit, truth = shown["kp stiffness"]
