@@ -28,7 +28,7 @@ writes into DIR
 
   bus.log        frames to and from the estimator, in the format of candump, in recorded time
   trace.csv      measured, estimated, standard deviations and health, a row for each sample
-  signals.mf4    the same signals with units and comments, for asammdf, PlotJuggler and the like
+  signals.mf4    with --format mf4: the same signals with units and comments, for asammdf, PlotJuggler and the like
   signals.mcap   with --format mcap: the same as messages, for Foxglove
   trace.parquet  with --format parquet: trace.csv with units, for pandas, polars and the like
   summary.json   estimates, innovations, what was found in the log, a verdict, and where the files come from
@@ -92,7 +92,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         ",KEY=VALUE as there, or a file that it writes",
     )
     add_signal_options(parser)
-    add_format_option(parser, ("csv", "mf4"))
+    add_format_option(parser)
     add_json_option(parser)
 
 

@@ -41,11 +41,6 @@ class Margins:
     modulus_frequency: float
     """[Hz]"""
 
-    @property
-    def gain_db(self) -> float:
-        """Return the gain margin [dB]."""
-        return float(20.0 * np.log10(self.gain))
-
 
 def margins(loop: Response, band: tuple[float, float] = BAND) -> Margins:
     """Return the margins of L in a band [Hz]."""

@@ -118,7 +118,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         const=_PRINT,
         help="use the estimator settings in FILE; without FILE: print a settings file with those of the run, and stop",
     )
-    add_format_option(sim, ("csv",))
+    add_format_option(sim)
     add_json_option(sim)
     sim.set_defaults(run=run, interface="lever")
     demo = subparsers.add_parser(
@@ -128,7 +128,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "front of its report are two flights of one who relaxes, with mitigation of collective bounce and without.",
     )
     demo.add_argument("-o", "--out", metavar="DIR", type=Path, default=Path("lever_demo"), help="default: %(default)s")
-    add_format_option(demo, ("csv",))
+    add_format_option(demo)
     add_json_option(demo)
     demo.set_defaults(run=run_demo, realtime=False, settings=None, snapshots=None)
 

@@ -96,11 +96,6 @@ class Consistency:
     inside: float
     """Share of times at which the mean over runs lies in its chi-square's 95 % band; 0.95 on average."""
 
-    @property
-    def consistent(self) -> bool:
-        """Whether the mean lies in its band."""
-        return self.mean_band[0] <= self.mean <= self.mean_band[1]
-
 
 def consistency(squares: Array, freedom: int) -> Consistency:
     """Return the consistency of NEES or NIS (B, T), each expected to be chi-square with `freedom` degrees of freedom.

@@ -18,3 +18,7 @@ def loop_of(coupled: Coupled | Tabulated, transfer: Transfer, row: int) -> stabi
         return response
 
     return loop
+
+
+def decibels(ratio: float) -> float:
+    return float(20.0 * np.log10(ratio))

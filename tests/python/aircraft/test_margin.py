@@ -16,7 +16,7 @@ from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.aircraft.flight import Flight
 from lever_sil.plants import lever_plant
 from lever_sil.scenarios import inputs, scenario
-from python.aircraft.loops import loop_of
+from python.aircraft.loops import decibels, loop_of
 from python.plants.motion import TRIM
 
 NAMES = ("m_p", "c_p", "k_p")
@@ -58,11 +58,11 @@ def test_margins_are_those_of_the_linearised_loop(name: str) -> None:
         coupled = Coupled(craft, random.uniform(0.2, 1.2))
         margins, found = expected(arm, coupled), said(arm, 1e-3, table(coupled))
         assert 2.0 < margins.frequency < 7.0
-        assert found.gain_margin == pytest.approx(margins.gain_db, abs=0.1)
+        assert found.gain_margin == pytest.approx(decibels(margins.gain), abs=0.1)
         assert found.frequency == pytest.approx(margins.frequency, rel=0.005)
-        if 0.0 < margins.gain_db < 10.0:
+        if 0.0 < decibels(margins.gain) < 10.0:
             assert found.modulus == pytest.approx(margins.modulus, abs=0.02)
-        elif margins.gain_db < 0.0:
+        elif decibels(margins.gain) < 0.0:
             assert found.modulus < 0.0
 
 
@@ -73,7 +73,7 @@ def test_standard_deviations_are_those_of_drawn_arms() -> None:
     found = said(arm, 0.1, table(coupled))
     random = np.random.default_rng(4)
     drawn = [expected(arm * np.exp(0.1 * random.standard_normal(3)), coupled) for _ in range(1000)]
-    assert found.gain_margin_sigma == pytest.approx(np.std([each.gain_db for each in drawn]), rel=0.1)
+    assert found.gain_margin_sigma == pytest.approx(np.std([decibels(each.gain) for each in drawn]), rel=0.1)
     assert found.frequency_sigma == pytest.approx(np.std([each.frequency for each in drawn]), rel=0.1)
     assert found.modulus_sigma == pytest.approx(np.std([each.modulus for each in drawn]), rel=0.15)
 
@@ -89,7 +89,9 @@ def test_what_the_table_is_off_by_is_in_the_standard_deviations() -> None:
     rotated = expected(arm, coupled, complex(1.0, 0.1))
     of_gain = math.sqrt(phase.gain_margin_sigma**2 - exact.gain_margin_sigma**2)
     of_frequency = math.sqrt(phase.frequency_sigma**2 - exact.frequency_sigma**2)
-    assert of_gain == pytest.approx(abs(rotated.gain_db - margins.gain_db), abs=0.02)  # the table is linear between
+    assert of_gain == pytest.approx(
+        abs(decibels(rotated.gain) - decibels(margins.gain)), abs=0.02
+    )  # the table is linear between
     assert of_frequency == pytest.approx(abs(rotated.frequency - margins.frequency), rel=0.05)
 
 
@@ -118,7 +120,9 @@ def test_the_alarm_comes_before_the_vibration_grows() -> None:
         body.advance(firmware.health().torque)
     at = np.arange(0, len(z_ddot) - 1, 20)
     transfer = known.truth.transfer(at)
-    true = np.array([stability.margins(loop_of(wanted.aircraft, transfer, i)).gain_db for i in range(0, len(at), 10)])
+    true = np.array(
+        [decibels(stability.margins(loop_of(wanted.aircraft, transfer, i)).gain) for i in range(0, len(at), 10)]
+    )
     gain, sigma = np.array(margins).T[:, ::10]
     judged = (at[::10] > 5000) & (true > -1.0)
     assert np.mean(np.abs(gain - true)[judged] < 2.0 * sigma[judged]) > 0.9

@@ -153,9 +153,8 @@ def test_the_commands_of_the_base_installation(without: Without, tmp_path: Path)
     assert done.stdout.splitlines()[-1] == " ".join([*"0" * (len(lines) - 1), "2"])
     pip = f"{sys.executable} -m pip"
     report = f'lever: warning: no report.html: this needs plotly: {pip} install "lever-cdkf[report]"\n'
-    mf4 = f'lever: warning: no signals.mf4: this needs asammdf: {pip} install "lever-cdkf[mf4]"\n'
     refused = "lever: error: interface lever stays inside one process"  # not: is missing
-    assert done.stderr.partition(refused)[:2] == (2 * report + mf4 + report, refused)
+    assert done.stderr.partition(refused)[:2] == (3 * report, refused)
     assert "Written to sim: summary.json, trace.csv, bus.log\n" in done.stdout
     for folder in ("sim", "replay"):
         assert sorted(os.listdir(tmp_path / folder)) == ["bus.log", "summary.json", "trace.csv"]
