@@ -11,10 +11,8 @@ SHORTER = {
     r"lever tune \S+": r"\g<0>" + "".join(f" --keep {name}" for name in KEPT.split()),
     r"lever compare --paper": r"\g<0> --duration 4 --estimators dual_annealing rls",
     r"lever figures --paper": r"\g<0> --only figure_4_states",
-    r"(?m)^lever replay (?!.*(?:--format|out/replay))(.*(?:-o|--out) \S+)": r"lever replay \1 --format csv",
 }
-"""Commands with less to calculate: one setting is looked for, two estimators are compared, one figure is drawn, and no
-MF4 is written, for which much is imported."""
+"""Commands with less to calculate: one setting is looked for, two estimators are compared, one figure is drawn."""
 
 
 def blocks(readme: Path, language: str) -> dict[int, str]:

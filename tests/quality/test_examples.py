@@ -31,6 +31,7 @@ SHORTER = {
     r"--seeds \d+": "--seeds 1",
     r"lever compare --models": "lever compare --duration 2 --scenarios step_up --models",
     r"--start 60 --length 120": "--length 20.5",
+    r"lever tune out/steady\S+": r"\g<0> --length 20.5",
     **readmes.SHORTER,
 }
 """The same command, with less to calculate."""

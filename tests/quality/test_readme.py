@@ -52,6 +52,7 @@ SHORTER = {
     r"lever campaign quick(?= --run)": "lever campaign quick.toml",
     r'duration="1 s"': 'duration="0.5 s"',
     r'duration="40 s"': 'duration="21 s"',
+    r"--length 30": "--length 20.5",
 }
 """The same command, with less to calculate."""
 
