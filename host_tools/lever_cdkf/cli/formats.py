@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 
 from ..errors import LeverError
-from ..runtime.extras import require_for_file, warn_of_left_out
+from ..runtime.extras import require_for_file, warn_of_no_report
 
 FORMATS = {"csv": "trace.csv", "mf4": "signals.mf4", "mcap": "signals.mcap", "parquet": "trace.parquet"}
 """And their files."""
+_DEFAULT = "csv"
 
 
 def add_format_option(parser: argparse.ArgumentParser) -> None:
@@ -17,7 +18,7 @@ def add_format_option(parser: argparse.ArgumentParser) -> None:
         "--format",
         metavar="LIST",
         type=_formats,
-        help=f"formats of the signals, of {','.join(FORMATS)} (default: csv)",
+        help=f"formats of the signals, of {','.join(FORMATS)} (default: {_DEFAULT})",
     )
 
 
@@ -30,8 +31,8 @@ def chosen_formats(args: argparse.Namespace) -> tuple[str, ...]:
         if args.format is not None:
             raise LeverError("--format is for the files of --out: say where these go")
         return ()
-    warn_of_left_out(["report.html"])
-    chosen: tuple[str, ...] = args.format or ("csv",)
+    warn_of_no_report()
+    chosen: tuple[str, ...] = args.format or (_DEFAULT,)
     for name in chosen:
         require_for_file(FORMATS[name])
     return chosen

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import shlex
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from ..errors import LeverError
 
@@ -23,12 +23,11 @@ PACKAGES = {
 """What each extra brings; imported by the same names."""
 
 _FILES = {
-    "report.html": ("report",),
     "signals.mf4": ("mf4",),
     "signals.mcap": ("files", "mcap"),
     "trace.parquet": ("files", "pyarrow"),
 }
-"""Files of a run that need an extra, and the packages of it that they need if not all. Without it they are left out."""
+"""Files of signals that need an extra, and the packages of it that they need if not all."""
 
 
 def missing(extra: str, *packages: str) -> str:
@@ -54,22 +53,16 @@ def require(extra: str, *packages: str) -> None:
         raise LeverError(reason)
 
 
-def missing_of_file(name: str) -> str:
-    """missing() of the extra that a file of a run needs."""
-    return missing(*_FILES[name]) if name in _FILES else ""
-
-
 def require_for_file(name: str) -> None:
     """Raise LeverError where a file of a run needs an extra that is missing."""
-    if reason := missing_of_file(name):
-        raise LeverError(reason)
+    if name in _FILES:
+        require(*_FILES[name])
 
 
-def warn_of_left_out(files: Iterable[str]) -> None:
-    """Say on standard error which of a run's files will not be written."""
-    for name in files:
-        if reason := missing_of_file(name):
-            print(f"lever: warning: no {name}: {reason}", file=sys.stderr)
+def warn_of_no_report() -> None:
+    """Say on standard error that there will be no report.html, where its extra is missing."""
+    if reason := missing("report"):
+        print(f"lever: warning: no report.html: {reason}", file=sys.stderr)
 
 
 def hide_mf4(arguments: Sequence[str]) -> None:
