@@ -29,7 +29,7 @@
 #define KINEMATICS_MIN 1e-6f    /* mean square of the integral from which on it says anything [rad^2] */
 #define KINEMATICS_BLOCK 0.02f  /* more often than this the sums hardly get new information [s] */
 #define KINEMATICS_BLOCKS 6.0f  /* from which on the gain has a standard deviation */
-#define KINEMATICS_SURE 2.5f    /* standard deviations that the gain may be off */
+#define KINEMATICS_SURE 2.0f    /* standard deviations that the gain may be off */
 #define OTHER_SHARE 0.01f       /* of its mean, by one sample in EVIDENCE_TORQUE_EVERY */
 #define OTHER_LEAST 2.5e-3f     /* mean square that is more than noise of the sensor [N^2 m^2] */
 #define OFFSET_MAX 0.02f        /* of theta: f_n, which is that at the angle shown, is off by its sigma [rad] */
@@ -131,22 +131,20 @@ bool evidence_has_other_torque(const evidence_t *evidence)
     return evidence->other_torque > OTHER_LEAST;
 }
 
-void evidence_add_outputs(evidence_t *evidence, const float y[CDKF_OUTPUTS], bool both, float elapsed, float period)
+void evidence_add_outputs(evidence_t *evidence, const float last[CDKF_OUTPUTS], const float y[CDKF_OUTPUTS], bool both,
+    float elapsed, float period)
 {
     kinematics_t *of = &evidence->kinematics;
     const float turn = KINEMATICS_CORNER * elapsed;
-    const float change[2] = {y[0] - of->last[0], (0.5f * elapsed) * (y[1] + of->last[1])};
+    const float change[2] = {y[0] - last[0], (0.5f * elapsed) * (y[1] + last[1])};
     const bool on = both && evidence->paired && (elapsed < greater(1.5f * period, KINEMATICS_LINE)) &&
                     (fabsf(change[0] - change[1]) < KINEMATICS_STEP);
-    for (uint32_t i = 0u; i < 2u; i++) {
+    for (uint32_t i = 0u; i < 2u; i++) { /* y of an output that is not valid may be NaN */
         of->passed[i] = on ? ((1.0f - turn) * (of->passed[i] + change[i])) : 0.0f;
         of->level[i] = on ? (of->level[i] + (turn * (of->passed[i] - of->level[i]))) : 0.0f;
+        of->sum[i] += of->passed[i] - of->level[i];
     }
     evidence->paired = both;
-    if (both) { /* y of an output that is not valid may be NaN */
-        of->last[0] = y[0];
-        of->last[1] = y[1];
-    }
 }
 
 void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time)
@@ -256,14 +254,17 @@ static void judge_motor(evidence_t *evidence, float period, float sample_period)
 /* Compares the angle with the integral of the rate. The gain's standard deviation is what else differs, over the root
  * of the effective number n of blocks (Kish 1965), as a few large ones may be most of the sum; n / (n - 2) times that, as
  * it is of so few itself (variance of Student's t). */
-static void judge_kinematics(evidence_t *evidence, float period)
+static void judge_kinematics(evidence_t *evidence, float period, float sample_period)
 {
     kinematics_t *of = &evidence->kinematics;
-    const float integral = of->passed[1] - of->level[1];
+    const float part = sample_period / period;
+    const float integral = part * of->sum[1];
     const float square = integral * integral;
     const float keep = 1.0f - share_of(period, AGREEMENT_MEMORY);
     const float least = KINEMATICS_MIN * (AGREEMENT_MEMORY / period);
-    agreement_add(&of->agreement, integral, of->passed[0] - of->level[0]);
+    agreement_add(&of->agreement, integral, part * of->sum[0]);
+    of->sum[0] = 0.0f;
+    of->sum[1] = 0.0f;
     of->fourth = (keep * keep * of->fourth) + (square * square);
     const float expected = of->agreement.expected;
     const float blocks = (expected * expected) * lesser(period * (1.0f / KINEMATICS_BLOCK), 1.0f);
@@ -332,7 +333,7 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
         evidence_set(evidence, EVIDENCE_FORCE, force);
     }
     judge_motor(evidence, period, setup->settings->sample_period);
-    judge_kinematics(evidence, period);
+    judge_kinematics(evidence, period, setup->settings->sample_period);
     if ((block->known || block->held) && !evidence_has(evidence, EVIDENCE_HANDS) &&
         !evidence_has(evidence, EVIDENCE_KINEMATICS)) { /* what does not agree says nothing of the base */
         judge_base(evidence, &sudden, period);

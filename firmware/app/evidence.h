@@ -45,11 +45,11 @@ typedef struct agreement {
 
 /* The angle and the integrated rate [rad], through the same second-order high-pass: offsets of either do not pass. */
 typedef struct kinematics {
-    float passed[2];          /* the first order of the angle, of the integral, */
-    float level[2];           /* and the level of that */
-    float last[MODEL_STATES]; /* sample [rad], [rad/s] */
-    agreement_t agreement;    /* of the angle with the integral, */
-    float fourth;             /* sum of the integral to the fourth: how many blocks the agreement rests on */
+    float passed[2];       /* the first order of the angle, of the integral, */
+    float level[2];        /* the level of that, */
+    float sum[2];          /* and what is left, over the samples of a block */
+    agreement_t agreement; /* of the angle with the integral, by their means of a block, */
+    float fourth;          /* sum of the integral to the fourth: how many blocks the agreement rests on */
 } kinematics_t;
 
 typedef struct motion {
@@ -148,8 +148,9 @@ void evidence_add_torque(evidence_t *evidence, float measured);
 /* Whether the torque may be other than the commanded one where it is not measured: somebody else was driving. */
 bool evidence_has_other_torque(const evidence_t *evidence);
 
-/* Outputs of a sample, and whether both are measured: [rad], [rad/s]. `period`: of samples [s]. */
-void evidence_add_outputs(evidence_t *evidence, const float y[CDKF_OUTPUTS], bool both, float elapsed, float period);
+/* Outputs of a sample, those before, and whether both are measured: [rad], [rad/s]. `period`: of samples [s]. */
+void evidence_add_outputs(evidence_t *evidence, const float last[CDKF_OUTPUTS], const float y[CDKF_OUTPUTS], bool both,
+    float elapsed, float period);
 
 /* After the update: nis / nis_size of the sample. */
 void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time);

@@ -173,8 +173,8 @@ void prediction_advance(
     estimator->torque_missing = follow_input(&estimator->trim, sample->torque, estimator->torque_missing, elapsed);
     predict(estimator, sample->z_ddot, sample->tau_m, sample->gripped ? &sample->grip_force : NULL, period);
     refuse_spikes(estimator, sample, elapsed);
-    evidence_add_outputs(&estimator->learning.evidence, sample->y, sample->valid[0] && sample->valid[1], elapsed,
-        estimator->setup.settings->sample_period);
+    evidence_add_outputs(&estimator->learning.evidence, estimator->trim.last, sample->y,
+        sample->valid[0] && sample->valid[1], elapsed, estimator->setup.settings->sample_period);
     if (subtract_trim(estimator, sample->y, sample->valid, period)) {
         trim_unsettle(&estimator->trim);
         estimator->learning.evidence.offset = 0.0f; /* the angle is what it is now */

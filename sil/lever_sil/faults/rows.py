@@ -391,13 +391,13 @@ def _table() -> Iterator[Row]:
 ROWS = {row.name: row for row in _table()}
 """All by name, in the order of the table."""
 
-_DRIFT = "angle and rate are compared; a gain that drifts slowly is found when it is off by an eighth"
+_DRIFT = "angle and rate are compared; a gain that drifts slowly is found when it is off by 6 to 10 %"
 _OFFSET = "a step passes the high-passes; for some pilots it is taken for a change of the arm"
 _TORQUE = "takes a second: a shorter memory takes other torque of a frequency near the dither's for a wrong gain"
 _BASE = "without torque a gain of z̈ is a scale of the arm, which no innovation tells from it; dither tells in seconds"
 _LEVELS = "its levels are off by the whole angle when it is right again: BASE and INNOVATION go after up to 3.6 s"
 _RATE_ALONE = "learnt from the rate alone, some pilots' arm is off by over 3 sigma for 2 s after the angle is back"
-_CLOCK = "the firmware has no clock of its own; a rate that is off by less than an eighth is that of another arm"
+_CLOCK = "the firmware has no clock of its own; one that is 10 % off is found by angle and rate after 0.5 to 4 s, and until then is that of another arm"
 _TRIM = "f_n is that at the angle shown, which drifts off, and k_p that is held does not make up for it"
 KNOWN: dict[str, str] = {
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",
