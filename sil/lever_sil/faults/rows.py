@@ -397,13 +397,12 @@ _TORQUE = "takes a second: a shorter memory takes other torque of a frequency ne
 _BASE = "without torque a gain of z̈ is a scale of the arm, which no innovation tells from it; dither tells in seconds"
 _LEVELS = "its levels are off by the whole angle when it is right again: BASE and INNOVATION go after up to 3.6 s"
 _RATE_ALONE = "learnt from the rate alone, some pilots' arm is off by over 3 sigma for 2 s after the angle is back"
-_CLOCK = "the firmware has no clock of its own; one that is 10 % off is found by angle and rate after 0.5 to 4 s, and until then is that of another arm"
+_CLOCK = "angle and rate tell in 0.5 to 4 s that it is 10 % fast, and until then it is that of another arm"
 _TRIM = "f_n is that at the angle shown, which drifts off, and k_p that is held does not make up for it"
 KNOWN: dict[str, str] = {
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",
     "theta_zero": _LEVELS,
     "theta_sign": _LEVELS,
-    "theta_gain_double": _LEVELS,
     "theta_gain_drift": _DRIFT,
     "theta_invalid_from_power_on": _RATE_ALONE,
     "theta_saturated_from_power_on": _RATE_ALONE,
@@ -411,6 +410,7 @@ KNOWN: dict[str, str] = {
     "theta_dot_gain_double": _LEVELS,
     "tau_m_stuck": _TORQUE,
     "tau_m_zero": _TORQUE,
+    "theta_dot_step": _OFFSET,
     "z_ddot_step": _OFFSET,
     "z_ddot_drift": _OFFSET,
     "z_ddot_sign": "where the base moves the lever little, it is not seen to be right again, and BASE stays",
@@ -421,9 +421,7 @@ KNOWN: dict[str, str] = {
     "grip_force_saturated": "a constant force passes no high-pass: it counts as none",
     "grip_force_gain_half": "CALIBRATION shows a gain that is too large sooner than one that is too small",
     "babble_1": "one random frame in 256 has a right CRC and is taken; COMMUNICATION shows, but flags no estimate",
-    "clock_half": _CLOCK,
     "clock_1.1": _CLOCK,
-    "clock_2": _CLOCK,
 }
 KNOWN |= {
     name: KNOWN[name.removesuffix(FROZEN)]
