@@ -140,9 +140,11 @@ void evidence_add_outputs(evidence_t *evidence, const float last[CDKF_OUTPUTS], 
     const bool on = both && evidence->paired && (elapsed < greater(1.5f * period, KINEMATICS_LINE)) &&
                     (fabsf(change[0] - change[1]) < KINEMATICS_STEP);
     for (uint32_t i = 0u; i < 2u; i++) { /* y of an output that is not valid may be NaN */
-        of->passed[i] = on ? ((1.0f - turn) * (of->passed[i] + change[i])) : 0.0f;
-        of->level[i] = on ? (of->level[i] + (turn * (of->passed[i] - of->level[i]))) : 0.0f;
-        of->sum[i] += of->passed[i] - of->level[i];
+        const float passed = on ? ((1.0f - turn) * (of->passed[i] + change[i])) : 0.0f;
+        const float left = on ? (passed - of->level[i]) : 0.0f;
+        of->level[i] = on ? (of->level[i] + (turn * left)) : 0.0f;
+        of->sum[i] += left;
+        of->passed[i] = passed;
     }
     evidence->paired = both;
 }
@@ -257,12 +259,11 @@ static void judge_motor(evidence_t *evidence, float period, float sample_period)
 static void judge_kinematics(evidence_t *evidence, float period, float sample_period)
 {
     kinematics_t *of = &evidence->kinematics;
-    const float part = sample_period / period;
-    const float integral = part * of->sum[1];
+    const float integral = of->sum[1]; /* times the samples of a block */
     const float square = integral * integral;
     const float keep = 1.0f - share_of(period, AGREEMENT_MEMORY);
-    const float least = KINEMATICS_MIN * (AGREEMENT_MEMORY / period);
-    agreement_add(&of->agreement, integral, part * of->sum[0]);
+    const float least = (KINEMATICS_MIN * AGREEMENT_MEMORY) * (period / (sample_period * sample_period));
+    agreement_add(&of->agreement, integral, of->sum[0]);
     of->sum[0] = 0.0f;
     of->sum[1] = 0.0f;
     of->fourth = (keep * keep * of->fourth) + (square * square);
