@@ -48,7 +48,7 @@ typedef struct kinematics {
     float passed[2];       /* the first order of the angle, of the integral, */
     float level[2];        /* the level of that, */
     float sum[2];          /* and what is left, over the samples of a block */
-    agreement_t agreement; /* of the angle with the integral, by their means of a block, */
+    agreement_t agreement; /* of the angle with the integral, by their sums over a block, */
     float fourth;          /* sum of the integral to the fourth: how many blocks the agreement rests on */
 } kinematics_t;
 

@@ -515,7 +515,7 @@ TEST(it_starts_long_after_a_change_and_without_a_ratio_that_nothing_is_known_of)
 }
 
 /* From a standard deviation of 0.35 of the gain on, there may be doubt of the base. */
-TEST(doubt_of_the_base_begins_previous_is_sure)
+TEST(doubt_of_the_base_begins_before_it_is_sure)
 {
     static const float sigma[] = {0.34f, 0.36f};
     for (uint32_t i = 0u; i < 2u; i++) {
