@@ -117,6 +117,7 @@ class Loop:
             index = getattr(lib, f"LOOP_{name.upper()}")
             self._fill_sensor(loop.sensor[index], name)
             loop.signal[index] = self.struct.doubles(signal)
+        loop.sensor[lib.LOOP_Z_DDOT].field = _field("BASE_SAMPLE", "z_ddot")
         self._fill_columns()
         self._fill_commands()
         rows = (count - 1) // every + 1
@@ -149,8 +150,7 @@ class Loop:
     def _fill_columns(self) -> None:
         loop, inputs = self.struct.pointer, self._inputs
         loop.base, loop.torque = self.struct.doubles(inputs.base), self.struct.doubles(inputs.torque)
-        loop.base_field, loop.torque_field = _field("BASE_SAMPLE", "z_ddot"), _field("MOTOR_COMMAND", "torque")
-        loop.correction_field = _field("CORRECTION", "correction")
+        loop.torque_field, loop.correction_field = _field("MOTOR_COMMAND", "torque"), _field("CORRECTION", "correction")
         loop.no_lever, loop.no_base = (
             self.struct.array("uint8_t", inputs.missing[frame], np.uint8) for frame in ("lever_frame", "base_frame")
         )
@@ -254,21 +254,14 @@ class Loop:
 def available(name: str, values: FloatArray) -> FloatArray:
     """Return the readings of the sensor `name`, NaN where they are beyond the range of their frame."""
     field = _field(_MESSAGES.get(name, "LEVER_SAMPLE"), name)
-    return np.where(np.abs(values / field["scale"]) < 0.5 * field["mask"], values, np.nan)  # most steps and a half
+    return np.where(np.abs(values / field["step"]) < field["most"] + 0.5, values, np.nan)
 
 
 @cache
 def _field(message: str, name: str) -> dict[str, float]:
     """Return a loop_field_t of the DBC."""
-    definition = codec.message(message)
-    signal = definition.get_signal_by_name(name)
-    valid = [other.start for other in definition.signals if other.name == f"{name}_valid"]
-    return {
-        "scale": float(signal.scale),
-        "mask": (1 << signal.length) - 1,
-        "start": signal.start,
-        "valid": valid[0] if valid else 0,
-    }
+    signal = codec.message(message).get_signal_by_name(name)
+    return {"step": float(signal.scale), "most": 2.0 ** (signal.length - 1) - 1.0}
 
 
 def _command_structs(commands: Sequence[Mapping[str, codec.Value]]) -> Any:

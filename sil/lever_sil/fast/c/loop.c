@@ -9,9 +9,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#define IDLE_US 5000u      /* without a sample, after which the firmware is told so, as lever_idle() asks for */
-#define TIME_LOW_START 48u /* of the messages of an estimator that belong to a sample */
-#define TIME_LOW_MASK 0xFFFFu
+#define IDLE_US 5000u /* without a sample, after which the firmware is told so, as lever_idle() asks for */
 
 static bool has_command(const loop_t *loop)
 {
@@ -19,13 +17,6 @@ static bool has_command(const loop_t *loop)
 }
 
 /* --- by structs -------------------------------------------------------------------------------------------------- */
-
-/* Not rounded as in a frame; but what does not fit into one is not available. */
-static float single(const loop_field_t *field, double value, bool *valid)
-{
-    *valid = pilot_fits(field, value / field->scale);
-    return *valid ? (float)value : 0.0f;
-}
 
 /* There is no sample: as a port does. */
 static void idle(loop_t *loop, lever_t *lever)
@@ -37,9 +28,12 @@ static void idle(loop_t *loop, lever_t *lever)
     }
 }
 
+/* Not rounded as in a frame; but what does not fit into one is not available. */
 static float reading_of(const loop_t *loop, enum loop_signal which, bool *valid)
 {
-    return single(&loop->sensor[which].field, pilot_reading(loop, which), valid);
+    const double value = pilot_reading(loop, which);
+    *valid = pilot_fits(&loop->sensor[which].field, value);
+    return *valid ? (float)value : 0.0f;
 }
 
 static void step_by_struct(loop_t *loop, lever_t *lever)
@@ -58,7 +52,7 @@ static void step_by_struct(loop_t *loop, lever_t *lever)
             sample.theta_dot = reading_of(loop, LOOP_THETA_DOT, &sample.theta_dot_valid);
             sample.tau_m = reading_of(loop, LOOP_TAU_M, &sample.tau_m_valid);
         }
-        sample.z_ddot = single(&loop->base_field, pilot_base(loop), &sample.z_ddot_valid);
+        sample.z_ddot = reading_of(loop, LOOP_Z_DDOT, &sample.z_ddot_valid);
         if (loop->has_grip) {
             sample.grip_force = reading_of(loop, LOOP_GRIP_FORCE, &sample.grip_force_valid);
         }
@@ -104,12 +98,10 @@ static void send(loop_t *loop, lever_t *lever, const lever_frame_t *frame)
     }
 }
 
-static void send_payload(loop_t *loop, lever_t *lever, uint32_t id, uint8_t data_id, uint64_t payload)
+static void send_protected(loop_t *loop, lever_t *lever, lever_frame_t *frame, enum message_data_id data_id)
 {
-    lever_frame_t frame;
-    layout_write(&frame, id, payload);
-    e2e_protect(&frame, data_id, (uint8_t)(loop->sample & 15u));
-    send(loop, lever, &frame);
+    e2e_protect(frame, (uint8_t)data_id, (uint8_t)(loop->sample & 15u));
+    send(loop, lever, frame);
 }
 
 /* Takes the first `count` of the frames that wait. */
@@ -147,24 +139,24 @@ static void send_command(loop_t *loop, lever_t *lever)
 /* Takes what the estimator has sent for this sample, up to its STATE_ESTIMATE. */
 static void take_answer(loop_t *loop)
 {
-    const uint32_t time_low = (loop->sample * loop->period_us) & TIME_LOW_MASK;
+    const uint16_t time_low = (uint16_t)((loop->sample * loop->period_us) & 0xFFFFu);
     double torque = 0.0;
     double correction = 0.0;
     uint32_t count = 0u;
     bool answered = false;
     while ((count < loop->pending) && !answered) {
-        lever_frame_t answer = {.length = (uint8_t)FRAME_BYTES};
-        (void)memcpy(answer.data, loop->pending_data[count], sizeof answer.data);
-        const uint64_t payload = layout_read(&answer);
-        const bool is_own = ((uint32_t)(payload >> TIME_LOW_START) == time_low);
-        const uint32_t id = loop->pending_id[count];
-        if ((id == (uint32_t)MESSAGE_MOTOR_COMMAND_ID) && is_own) {
-            torque = pilot_value(&loop->torque_field, payload);
-        } else if ((id == (uint32_t)MESSAGE_CORRECTION_ID) && is_own) {
-            correction = pilot_value(&loop->correction_field, payload);
-        } else if (id == (uint32_t)MESSAGE_STATE_ESTIMATE_ID) {
-            answered = is_own;
-            loop->misplaced += is_own ? 0u : 1u;
+        lever_frame_t frame = {.id = loop->pending_id[count], .length = (uint8_t)FRAME_BYTES};
+        (void)memcpy(frame.data, loop->pending_data[count], sizeof frame.data);
+        message_motor_command_t motor;
+        message_correction_t corrected;
+        message_state_estimate_t estimate;
+        if (message_motor_command_decode(&motor, &frame) && (motor.time_low == time_low)) {
+            torque = pilot_rounded(&loop->torque_field, (double)motor.torque);
+        } else if (message_correction_decode(&corrected, &frame) && (corrected.time_low == time_low)) {
+            correction = pilot_rounded(&loop->correction_field, (double)corrected.correction);
+        } else if (message_state_estimate_decode(&estimate, &frame)) {
+            answered = (estimate.time_low == time_low);
+            loop->misplaced += answered ? 0u : 1u;
         } else {
             /* of no interest here */
         }
@@ -194,21 +186,18 @@ static void step_by_frames(loop_t *loop, lever_t *lever)
     if (has_command(loop)) {
         send_command(loop, lever);
     }
+    lever_frame_t frame;
     if (loop->no_lever[loop->sample] == 0u) {
-        uint64_t payload = 0u;
-        for (uint32_t i = 0u; i < (uint32_t)LOOP_GRIP_FORCE; i++) {
-            payload |= pilot_bits(&loop->sensor[i].field, pilot_reading(loop, (enum loop_signal)i));
-        }
-        send_payload(loop, lever, (uint32_t)MESSAGE_LEVER_SAMPLE_ID, (uint8_t)MESSAGE_LEVER_SAMPLE_DATA_ID, payload);
+        pilot_lever_sample(loop, &frame);
+        send_protected(loop, lever, &frame, MESSAGE_LEVER_SAMPLE_DATA_ID);
     }
     if (loop->has_grip) {
-        const uint64_t payload = pilot_bits(&loop->sensor[LOOP_GRIP_FORCE].field, pilot_reading(loop, LOOP_GRIP_FORCE));
-        send_payload(loop, lever, (uint32_t)MESSAGE_GRIP_SAMPLE_ID, (uint8_t)MESSAGE_GRIP_SAMPLE_DATA_ID, payload);
+        pilot_grip_sample(loop, &frame);
+        send_protected(loop, lever, &frame, MESSAGE_GRIP_SAMPLE_DATA_ID);
     }
     if (loop->no_base[loop->sample] == 0u) {
-        const uint64_t time_us = (uint64_t)(loop->sample * loop->period_us) << 32u;
-        const uint64_t payload = pilot_bits(&loop->base_field, pilot_base(loop)) | time_us;
-        send_payload(loop, lever, (uint32_t)MESSAGE_BASE_SAMPLE_ID, (uint8_t)MESSAGE_BASE_SAMPLE_DATA_ID, payload);
+        pilot_base_sample(loop, &frame);
+        send_protected(loop, lever, &frame, MESSAGE_BASE_SAMPLE_DATA_ID);
         take_answer(loop);
         if (loop->recorder != NULL) {
             take_snapshots(loop, lever);

@@ -28,12 +28,10 @@ enum loop_limits {
     LOOP_FRAMES = 96     /* that a sample can bring into the record, at most */
 };
 
-/* A field of a frame, as the DBC has it: value = scale * its signed bits. */
+/* A value as a frame carries it, by the DBC: a multiple of `step`, at most `most` of them. */
 typedef struct loop_field {
-    double scale;
-    uint32_t mask;
-    uint8_t start; /* the lowest bit */
-    uint8_t valid; /* the bit that says whether it is valid */
+    double step;
+    double most;
 } loop_field_t;
 
 /* A sensor of a signal that depends on the run: gain * value, so much later, plus offset. */
@@ -69,8 +67,7 @@ typedef struct loop {
     plant_t plant;
     loop_cabin_t cabin; /* with one signal[LOOP_Z_DDOT], at the accelerometer, has its first value */
     loop_sensor_t sensor[LOOP_SIGNALS];
-    const double *base; /* measured z_ddot, without a cabin [m/s^2]; NaN: marked invalid */
-    loop_field_t base_field;
+    const double *base;                      /* measured z_ddot, without a cabin [m/s^2]; NaN: marked invalid */
     loop_field_t torque_field;               /* of MOTOR_COMMAND */
     loop_field_t correction_field;           /* of CORRECTION */
     const uint8_t *no_lever;                 /* the frame is never sent */

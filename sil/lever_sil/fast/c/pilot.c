@@ -1,5 +1,7 @@
 #include "pilot.h"
 
+#include "can/messages.h"
+
 #include <math.h>
 #include <stddef.h>
 
@@ -25,7 +27,9 @@ double pilot_reading(const loop_t *loop, enum loop_signal which)
     const loop_sensor_t *sensor = &loop->sensor[which];
     const uint32_t sample = loop->sample;
     double value;
-    if (sensor->source == NULL) {
+    if ((which == LOOP_Z_DDOT) && !loop->cabin.exists) {
+        value = loop->base[sample];
+    } else if (sensor->source == NULL) {
         value = reading(sensor, loop->signal[which], (int64_t)sample);
     } else {
         value = (sensor->factor[sample] * reading(sensor, loop->signal[which], sensor->source[sample])) +
@@ -45,39 +49,46 @@ void pilot_note(loop_t *loop)
     }
 }
 
-double pilot_base(const loop_t *loop)
-{
-    return loop->cabin.exists ? pilot_reading(loop, LOOP_Z_DDOT) : loop->base[loop->sample];
-}
-
 /* --- frames ------------------------------------------------------------------------------------------------------- */
 
-bool pilot_fits(const loop_field_t *field, double steps)
+bool pilot_fits(const loop_field_t *field, double value)
 {
-    const double most = (double)(field->mask >> 1u);
-    return (steps > (-most - 0.5)) && (steps < (most + 0.5));
+    return fabs(value / field->step) < (field->most + 0.5);
 }
 
-uint64_t pilot_bits(const loop_field_t *field, double value)
+double pilot_rounded(const loop_field_t *field, double value)
 {
-    const double steps = value / field->scale;
-    uint64_t bits = 0u;
-    if (pilot_fits(field, steps)) {
-        const uint32_t count = (uint32_t)(int32_t)rint(steps) & field->mask;
-        bits = ((uint64_t)count << field->start) | ((uint64_t)1u << field->valid);
-    } else if (!isnan(value)) {
-        bits = (uint64_t)(field->mask ^ (field->mask >> 1u)) << field->start;
-    } else {
-        /* all 0 */
-    }
-    return bits;
+    return rint(value / field->step) * field->step;
 }
 
-double pilot_value(const loop_field_t *field, uint64_t payload)
+static float sent(const loop_t *loop, enum loop_signal which, bool *valid)
 {
-    const uint32_t sign = field->mask ^ (field->mask >> 1u);
-    const uint32_t flipped = ((uint32_t)(payload >> field->start) & field->mask) ^ sign;
-    return (double)((int32_t)flipped - (int32_t)sign) * field->scale;
+    const double value = pilot_rounded(&loop->sensor[which].field, pilot_reading(loop, which));
+    *valid = !isnan(value);
+    return (float)value;
+}
+
+void pilot_lever_sample(const loop_t *loop, struct lever_frame *frame)
+{
+    message_lever_sample_t message;
+    message.theta = sent(loop, LOOP_THETA, &message.theta_valid);
+    message.theta_dot = sent(loop, LOOP_THETA_DOT, &message.theta_dot_valid);
+    message.tau_m = sent(loop, LOOP_TAU_M, &message.tau_m_valid);
+    (void)message_lever_sample_encode(frame, &message);
+}
+
+void pilot_base_sample(const loop_t *loop, struct lever_frame *frame)
+{
+    message_base_sample_t message = {.time_us = loop->sample * loop->period_us};
+    message.z_ddot = sent(loop, LOOP_Z_DDOT, &message.z_ddot_valid);
+    (void)message_base_sample_encode(frame, &message);
+}
+
+void pilot_grip_sample(const loop_t *loop, struct lever_frame *frame)
+{
+    message_grip_sample_t message;
+    message.grip_force = sent(loop, LOOP_GRIP_FORCE, &message.grip_force_valid);
+    (void)message_grip_sample_encode(frame, &message);
 }
 
 /* --- motion ------------------------------------------------------------------------------------------------------- */

@@ -7,21 +7,20 @@
 /* Keeps the true signals of this sample, from which its sensors read. */
 void pilot_note(loop_t *loop);
 
-/* What a sensor reads at this sample; NaN: it is marked invalid. */
+/* What a sensor reads at this sample, also of the base acceleration; NaN: it is marked invalid. */
 double pilot_reading(const loop_t *loop, enum loop_signal which);
 
-/* The same of the base acceleration, which with a cabin depends on the run. */
-double pilot_base(const loop_t *loop);
+/* Whether a frame can carry a value; NaN does not fit. */
+bool pilot_fits(const loop_field_t *field, double value);
 
-/* Whether a frame can carry a value of so many steps of its field, as in the codec of host_tools; NaN does not fit. */
-bool pilot_fits(const loop_field_t *field, double steps);
+/* The nearest value that a frame can carry, half to even. In double precision, as the codec of host_tools has it: the
+ * firmware's codec then has nothing to round. */
+double pilot_rounded(const loop_field_t *field, double value);
 
-/* Bits of a value at their place, with the bit that says that it is valid. As the codec of host_tools: rounded in double
- * precision, half to even; what does not fit is not available. */
-uint64_t pilot_bits(const loop_field_t *field, double value);
-
-/* The value of the field in a payload. */
-double pilot_value(const loop_field_t *field, uint64_t payload);
+/* The readings of this sample as frames, without E2E protection. */
+void pilot_lever_sample(const loop_t *loop, struct lever_frame *frame);
+void pilot_base_sample(const loop_t *loop, struct lever_frame *frame);
+void pilot_grip_sample(const loop_t *loop, struct lever_frame *frame);
 
 /* After this sample: a correction that is too old counts as none. */
 void pilot_age_correction(loop_t *loop);

@@ -6,7 +6,6 @@
  * on. The last blocks are the columns of enum column.
  */
 #include "can/e2e.h"
-#include "can/layout.h"
 #include "can/messages.h"
 #include "fmu.h"
 #include "fmu_config.h"
@@ -172,23 +171,14 @@ bool model_start(fmu_t *fmu)
 
 /* --- steps ----------------------------------------------------------------------------------------------------------- */
 
-/* An input as a frame carries it. */
-static double torque_of(const fmu_t *fmu, const loop_t *loop)
+/* An input, or what a frame with it carries: nothing acts that does not fit. */
+static double input_of(const fmu_t *fmu, uint32_t at, const loop_field_t *field)
 {
-    const double torque = isfinite(fmu->value[AT_torque]) ? fmu->value[AT_torque] : 0.0;
-    lever_frame_t frame;
-    message_motor_command_t message = {.torque = (float)torque};
-    const bool is_framed = (fmu->value[AT_as_frames] != 0.0) && message_motor_command_encode(&frame, &message);
-    return is_framed ? pilot_value(&loop->torque_field, layout_read(&frame)) : torque;
-}
-
-static double correction_of(const fmu_t *fmu, const loop_t *loop)
-{
-    const double angle = isfinite(fmu->value[AT_correction]) ? fmu->value[AT_correction] : 0.0;
-    lever_frame_t frame;
-    message_correction_t message = {.correction = (float)angle};
-    const bool is_framed = (fmu->value[AT_as_frames] != 0.0) && message_correction_encode(&frame, &message);
-    return is_framed ? pilot_value(&loop->correction_field, layout_read(&frame)) : angle;
+    double value = isfinite(fmu->value[at]) ? fmu->value[at] : 0.0;
+    if (fmu->value[AT_as_frames] != 0.0) {
+        value = pilot_fits(field, value) ? pilot_rounded(field, value) : 0.0;
+    }
+    return value;
 }
 
 static void warn_of_inputs(fmu_t *fmu)
@@ -211,8 +201,8 @@ fmi3Status model_step(fmu_t *fmu)
     loop_t *loop = &pilot->loop;
     warn_of_inputs(fmu);
     if ((loop->sample + 1u) < loop->count) {
-        loop->asked = torque_of(fmu, loop);
-        loop->correction = correction_of(fmu, loop);
+        loop->asked = input_of(fmu, AT_torque, &loop->torque_field);
+        loop->correction = input_of(fmu, AT_correction, &loop->correction_field);
         pilot_age_correction(loop);
         pilot_advance(loop);
         loop->sample++;
@@ -243,18 +233,12 @@ static void put_framed(fmu_t *fmu, const loop_t *loop)
     message_lever_sample_t lever = {0};
     message_base_sample_t base = {0};
     message_grip_sample_t grip = {0};
-    uint64_t payload = 0u;
-    for (uint32_t i = 0u; i < (uint32_t)LOOP_GRIP_FORCE; i++) {
-        payload |= pilot_bits(&loop->sensor[i].field, pilot_reading(loop, (enum loop_signal)i));
-    }
-    layout_write(&frame, (uint32_t)MESSAGE_LEVER_SAMPLE_ID, payload);
+    pilot_lever_sample(loop, &frame);
     (void)message_lever_sample_decode(&lever, &frame);
-    layout_write(&frame, (uint32_t)MESSAGE_BASE_SAMPLE_ID, pilot_bits(&loop->base_field, pilot_base(loop)));
+    pilot_base_sample(loop, &frame);
     (void)message_base_sample_decode(&base, &frame);
     if (loop->has_grip) {
-        const loop_sensor_t *sensor = &loop->sensor[LOOP_GRIP_FORCE];
-        layout_write(
-            &frame, (uint32_t)MESSAGE_GRIP_SAMPLE_ID, pilot_bits(&sensor->field, pilot_reading(loop, LOOP_GRIP_FORCE)));
+        pilot_grip_sample(loop, &frame);
         (void)message_grip_sample_decode(&grip, &frame);
     }
     const bool has_lever = (loop->no_lever[loop->sample] == 0u);
@@ -266,21 +250,21 @@ static void put_framed(fmu_t *fmu, const loop_t *loop)
 }
 
 /* What does not fit into a frame is not available. */
-static void put_reading(fmu_t *fmu, uint32_t at, const loop_field_t *field, double value, bool is_sent)
+static void put_reading(fmu_t *fmu, uint32_t at, const loop_t *loop, enum loop_signal which, bool is_sent)
 {
-    put(fmu, at, value, is_sent && pilot_fits(field, value / field->scale));
+    const double value = pilot_reading(loop, which);
+    put(fmu, at, value, is_sent && pilot_fits(&loop->sensor[which].field, value));
 }
 
 static void put_readings(fmu_t *fmu, const loop_t *loop)
 {
     const bool has_lever = (loop->no_lever[loop->sample] == 0u);
-    const loop_sensor_t *sensor = loop->sensor;
-    put_reading(fmu, AT_theta, &sensor[LOOP_THETA].field, pilot_reading(loop, LOOP_THETA), has_lever);
-    put_reading(fmu, AT_theta_dot, &sensor[LOOP_THETA_DOT].field, pilot_reading(loop, LOOP_THETA_DOT), has_lever);
-    put_reading(fmu, AT_tau_m, &sensor[LOOP_TAU_M].field, pilot_reading(loop, LOOP_TAU_M), has_lever);
-    put_reading(fmu, AT_z_ddot, &loop->base_field, pilot_base(loop), true);
+    put_reading(fmu, AT_theta, loop, LOOP_THETA, has_lever);
+    put_reading(fmu, AT_theta_dot, loop, LOOP_THETA_DOT, has_lever);
+    put_reading(fmu, AT_tau_m, loop, LOOP_TAU_M, has_lever);
+    put_reading(fmu, AT_z_ddot, loop, LOOP_Z_DDOT, true);
     if (loop->has_grip) {
-        put_reading(fmu, AT_grip_force, &sensor[LOOP_GRIP_FORCE].field, pilot_reading(loop, LOOP_GRIP_FORCE), true);
+        put_reading(fmu, AT_grip_force, loop, LOOP_GRIP_FORCE, true);
     }
 }
 
