@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,20 +9,18 @@ from typing import Any
 
 import numpy as np
 from lever_cdkf.firmware.config import Config
-from lever_cdkf.firmware.estimator import Estimator, feed, make_command
+from lever_cdkf.firmware.estimator import Estimator, feed
 from lever_cdkf.firmware.library import ffi, struct_dtype
 from lever_cdkf.firmware.library import lib as firmware_lib
 from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
-from ..fast.library import Struct, lib
+from .closed_loop import Loop
 from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, columns, lanes, truth
-from .plant import TICK, BatchPlant
+from .plant import TICK
 from .sensors import NOISE, lost
 
 PARAMETERS = ("m_p", "c_p", "k_p")
-MOTOR_LAG = 2e-3
-"""Time constant with which the motor's torque follows the firmware's [s]."""
 RESPONSE_STRIDE = 50
 """Rows of a track between two responses."""
 _KEEP_ALIVE = 250  # samples between two commands
@@ -122,28 +119,24 @@ def closed_loop(
     the last torque that it was asked for.
     """
     given = lanes(motion, seeds)
-    plant, (count, width) = BatchPlant(given), given.z_ddot.shape
-    noise = [sigma * columns(f"noise of {what}", seeds, count) for what, sigma in NOISE.items()]
-    gone = lost(seeds, count, loop.lost, loop.lost_for)
-    tau_m, notes = np.zeros((count, width)), _Notes(count, width)
-    estimators = [Estimator(config) for _ in seeds]
-    struct = Struct("lanes_loop_t")
-    closed = struct.pointer
-    closed.lever = struct.keep(ffi.new("struct lever *[]", [each.pointer for each in estimators]))
-    closed.period_us, closed.keep_alive = round(PERIOD * 1e6), _KEEP_ALIVE
-    closed.command = struct.keep(make_command(dither_rms=loop.dither))
-    closed.decay, closed.loses_whole = math.exp(-PERIOD / MOTOR_LAG), loop.whole
-    closed.lost = struct.array("uint8_t", gone, np.uint8)
-    closed.z_ddot, closed.noise = plant.column(given.z_ddot), [plant.column(each) for each in noise]
-    closed.tau_m, closed.asked = struct.doubles(tau_m), struct.doubles(np.zeros(width))
-    closed.stride, closed.rows = STRIDE, notes.estimates.shape[1]
-    closed.estimate = struct.array("lever_estimate_t", notes.estimates, notes.estimates.dtype)
-    closed.health = struct.array("lever_health_t", notes.healths, notes.healths.dtype)
-    for first in range(0, count, TICK):
-        lib.lanes_close(plant.struct.pointer, closed, first, min(first + TICK, count))
-        tick()
-    recording = Recording(motion.time, plant.theta, plant.theta_dot, tau_m, given.z_ddot, truth(given))
-    return recording, _track(notes)
+    count, width = given.z_ddot.shape
+    noise = {what: sigma * columns(f"noise of {what}", seeds, count) for what, sigma in NOISE.items()}
+    gone, notes, runs = lost(seeds, count, loop.lost, loop.lost_for), _Notes(count, width), []
+    commanded = np.arange(0, count, _KEEP_ALIVE)
+    for run in range(width):
+        own = {what: values[:, run] for what, values in noise.items()}
+        closed = Loop(given.only(run), own, config, STRIDE)
+        closed.lose(gone[:, run], gone[:, run] & loop.whole)
+        closed.command(commanded, [{"dither_rms": loop.dither}] * len(commanded))
+        for last in range(TICK, count + TICK, TICK):
+            closed.advance(min(last, count))
+            tick()
+        notes.estimates[run], notes.healths[run] = closed.estimate, closed.health
+        runs.append(closed.signals)
+    theta, theta_dot, tau_m = (
+        np.stack([each[what] for each in runs], axis=1) for what in ("theta", "theta_dot", "tau_m")
+    )
+    return Recording(motion.time, theta, theta_dot, tau_m, given.z_ddot, truth(given)), _track(notes)
 
 
 class _Notes:

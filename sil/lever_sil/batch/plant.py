@@ -13,7 +13,7 @@ lever that it stops is held by it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -73,6 +73,11 @@ class Lanes:
         """Return the rows of an array at these samples."""
         values: FloatArray = getattr(self, name)
         return values[samples if len(values) > 1 else np.zeros_like(samples)]
+
+    def only(self, lane: int) -> Lanes:
+        """Return one of them."""
+        columns = {each.name: getattr(self, each.name) for each in fields(self)}
+        return replace(self, **{name: of[:, [lane]] for name, of in columns.items() if isinstance(of, np.ndarray)})
 
 
 def beside(parts: list[Lanes]) -> Lanes:

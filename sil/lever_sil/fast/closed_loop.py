@@ -28,7 +28,9 @@ from .library import Struct, lib
 STRIDE = 0.02
 """Time between two estimates that are kept [s]."""
 
-_MESSAGES = {"grip_force": "GRIP_SAMPLE", "z_ddot": "BASE_SAMPLE"}
+_MESSAGES = {
+    "grip_force": "GRIP_SAMPLE", "z_ddot": "BASE_SAMPLE", "torque": "MOTOR_COMMAND", "correction": "CORRECTION"
+}  # fmt: skip
 """That carry what LEVER_SAMPLE does not."""
 _FRAMES_AT_ONCE = 1 << 17
 
@@ -101,7 +103,8 @@ class Loop:
         self.struct = Struct("loop_t")
         count = len(inputs.time)
         loop = self.struct.pointer
-        loop.count, loop.period_us, loop.stride = count, round(scenario.period * 1e6), every
+        loop.count, loop.period_us = count, round(scenario.period * 1e6)
+        loop.stride = loop.health_stride = every
         loop.by_frames, loop.has_grip = by_frames, scenario.sensors.grip_force is not None
         loop.most_unanswered = 0xFFFFFFFF
         self.correction = np.zeros(count)
@@ -117,7 +120,7 @@ class Loop:
             index = getattr(lib, f"LOOP_{name.upper()}")
             self._fill_sensor(loop.sensor[index], name)
             loop.signal[index] = self.struct.doubles(signal)
-        loop.sensor[lib.LOOP_Z_DDOT].field = _field("BASE_SAMPLE", "z_ddot")
+        loop.sensor[lib.LOOP_Z_DDOT].field = field_of("z_ddot")
         self._fill_columns()
         self._fill_commands()
         rows = (count - 1) // every + 1
@@ -141,7 +144,7 @@ class Loop:
         given.gain = 1.0 + readings.sensor.gain_error
         given.whole, given.part = readings.sensor.lag(self._scenario.period)
         given.offset = self.struct.doubles(readings.offsets)
-        given.field = _field(_MESSAGES.get(name, "LEVER_SAMPLE"), name)
+        given.field = field_of(name)
         if readings.corruption is not None:
             given.source = self.struct.array("int64_t", readings.corruption.source, np.int64)
             given.factor = self.struct.doubles(readings.corruption.factor)
@@ -149,8 +152,10 @@ class Loop:
 
     def _fill_columns(self) -> None:
         loop, inputs = self.struct.pointer, self._inputs
-        loop.base, loop.torque = self.struct.doubles(inputs.base), self.struct.doubles(inputs.torque)
-        loop.torque_field, loop.correction_field = _field("MOTOR_COMMAND", "torque"), _field("CORRECTION", "correction")
+        loop.torque = self.struct.doubles(inputs.torque)
+        if not loop.cabin.exists:
+            loop.base = self.struct.doubles(inputs.base)
+        loop.torque_field, loop.correction_field = field_of("torque"), field_of("correction")
         loop.no_lever, loop.no_base = (
             self.struct.array("uint8_t", inputs.missing[frame], np.uint8) for frame in ("lever_frame", "base_frame")
         )
@@ -167,7 +172,7 @@ class Loop:
         if loop.by_frames:
             loop.command_frame = self.struct.keep(_command_frames(values))
         else:
-            loop.command = self.struct.keep(_command_structs(values))
+            loop.command = self.struct.keep(command_structs(values))
 
     def watch(self, aircraft: AircraftResponse | None) -> NDArray[Any]:
         """Have the firmware watch the loop with this aircraft, where there is one.
@@ -253,18 +258,18 @@ class Loop:
 
 def available(name: str, values: FloatArray) -> FloatArray:
     """Return the readings of the sensor `name`, NaN where they are beyond the range of their frame."""
-    field = _field(_MESSAGES.get(name, "LEVER_SAMPLE"), name)
+    field = field_of(name)
     return np.where(np.abs(values / field["step"]) < field["most"] + 0.5, values, np.nan)
 
 
 @cache
-def _field(message: str, name: str) -> dict[str, float]:
-    """Return a loop_field_t of the DBC."""
-    signal = codec.message(message).get_signal_by_name(name)
+def field_of(name: str) -> dict[str, float]:
+    """Return the loop_field_t of a sensor's signal, of torque or of correction."""
+    signal = codec.message(_MESSAGES.get(name, "LEVER_SAMPLE")).get_signal_by_name(name)
     return {"step": float(signal.scale), "most": 2.0 ** (signal.length - 1) - 1.0}
 
 
-def _command_structs(commands: Sequence[Mapping[str, codec.Value]]) -> Any:
+def command_structs(commands: Sequence[Mapping[str, codec.Value]]) -> Any:
     """Return the command structs of type lever_command_t[]."""
     structs: list[Any] = [make_command(**values) for values in commands]  # type: ignore[arg-type]
     return ffi.new("lever_command_t[]", [each[0] for each in structs])

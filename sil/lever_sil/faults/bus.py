@@ -18,7 +18,7 @@ from ..fast.library import lib
 Indices = NDArray[np.intp]
 Interval = tuple[float, float]
 
-FRAME = struct_dtype("channel_frame_t")
+FRAME = struct_dtype("loop_arrival_t")
 SAMPLES = ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")
 """Messages of every sample, in the order in which they are sent."""
 KEEP_ALIVE = 250
@@ -28,7 +28,6 @@ EXTENDED, REMOTE, ERROR = 1 << 31, 1 << 30, 1 << 29
 FULL_LOAD = 8
 """Frames of 8 bytes in a millisecond at 1 Mbit/s."""
 
-_KIND = {"LEVER_SAMPLE": lib.CHANNEL_LEVER, "GRIP_SAMPLE": lib.CHANNEL_GRIP, "BASE_SAMPLE": lib.CHANNEL_BASE}
 _PLACE = {"COMMAND": 0.05, "LEVER_SAMPLE": 0.1, "GRIP_SAMPLE": 0.2, "BASE_SAMPLE": 0.3}
 """Of a message among those of a sample."""
 
@@ -62,7 +61,7 @@ class Bus:
         at = np.arange(count, dtype=np.intp)
         for name in SAMPLES if grip else (SAMPLES[0], SAMPLES[2]):
             frames = np.zeros(count, FRAME)
-            frames["kind"], frames["id"] = _KIND[name], codec.message(name).frame_id
+            frames["content"], frames["id"] = getattr(lib, f"LOOP_{name}"), codec.message(name).frame_id
             frames["data_id"], frames["counter"], frames["length"] = codec.data_ids(name)[0], at & 15, 8
             frames["of"] = at
             self.add(frames, at + _PLACE[name])
@@ -79,7 +78,7 @@ class Bus:
     ) -> None:
         """Frames with data of their own: of a message by name, or by their identifiers."""
         frames = np.zeros(len(data), FRAME)
-        frames["kind"], frames["length"] = lib.CHANNEL_OTHER, 8
+        frames["content"], frames["length"] = lib.LOOP_OTHER, 8
         frames["id"] = codec.message(identifier).frame_id if isinstance(identifier, str) else identifier
         frames["of"], frames["change"] = order.astype(np.int64), np.frombuffer(b"".join(data), np.uint8).reshape(-1, 8)
         self.add(frames, order)

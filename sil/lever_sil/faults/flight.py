@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from lever_cdkf.firmware.config import Config
-from lever_cdkf.firmware.estimator import Estimator
-from lever_cdkf.firmware.library import struct_dtype
 from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
-from ..batch.firmware import MOTOR_LAG
-from ..batch.motions import PERIOD, STRIDE, Motion, columns, lanes, stream, truth
-from ..batch.plant import BatchPlant, Lanes, grip_force
+from ..batch.closed_loop import Loop
+from ..batch.motions import PERIOD, Motion, columns, lanes, stream, truth
+from ..batch.plant import Lanes, grip_force
 from ..batch.sensors import GRIP_NOISE, NOISE
-from ..fast.library import Struct, lib
+from ..fast.library import lib
 from . import bus, readings
 from .bus import Bus, Interval
-from .readings import SIGNALS, Readings
+from .readings import Readings
 
 DITHER = 0.3
 """rms that COMMANDs ask for [N m]."""
@@ -61,9 +58,9 @@ class Pilot:
     @cached_property
     def grip_force(self) -> FloatArray:
         """Of the hand on the lever in a flight without faults [N]; the motor does the same in all such."""
-        plant = BatchPlant(self.lanes)
-        self._fly(plant, None, Config(), *self._right(False))
-        force: FloatArray = grip_force(self.lanes, plant.theta, plant.theta_dot)[:, 0]
+        flight = self._closed(None, Config(), *self._right(False))
+        theta, theta_dot = (flight.signals[name][:, None] for name in ("theta", "theta_dot"))
+        force: FloatArray = grip_force(self.lanes, theta, theta_dot)[:, 0]
         return force
 
     def fly(
@@ -84,35 +81,25 @@ class Pilot:
             bus.freeze(sent, FREEZE)
         on_readings(read, sent.samples(time))
         on_bus(sent, time)
-        return self._fly(BatchPlant(self.lanes), self.grip_force if grip else None, config, sent, read)
+        flight = self._closed(self.grip_force if grip else None, config, sent, read)
+        loop = flight.struct.pointer
+        return Record(flight.health, flight.estimate, flight.asked, tuple(loop.result), loop.arrivals, loop.unanswered)
 
     def _right(self, grip: bool) -> tuple[Bus, Readings]:
         random = stream("faults", self.seed)
         return Bus(self.count, PERIOD, grip, DITHER, random), Readings.right(self.count, PERIOD, random)
 
-    def _fly(self, plant: BatchPlant, force: FloatArray | None, config: Config, sent: Bus, read: Readings) -> Record:
-        estimator, struct, frames = Estimator(config), Struct("channel_t"), sent.delivered()
-        rows = (self.count - 1) // STRIDE + 1
-        health = np.zeros(self.count, struct_dtype("lever_health_t"))
-        estimate = np.zeros(rows, struct_dtype("lever_estimate_t"))
-        asked = np.zeros(self.count)
-        channel = struct.pointer
-        channel.lane = plant.struct.pointer[0]
-        channel.decay, channel.step_seconds = math.exp(-PERIOD / MOTOR_LAG), PERIOD
-        channel.z_ddot = struct.doubles(self.lanes.z_ddot[:, 0])
+    def _closed(self, force: FloatArray | None, config: Config, sent: Bus, read: Readings) -> Loop:
+        flight = Loop(self.lanes, self.noise, config, health_stride=1)
         if force is not None:
-            channel.grip_force = struct.doubles(force)
-        for sensor, name in zip(channel.sensor, SIGNALS, strict=True):
-            of = read.of[name]
-            sensor.noise, sensor.factor, sensor.error = (
-                struct.doubles(values) for values in (self.noise[name], of.factor, of.error)
-            )
-            sensor.source = struct.array("uint32_t", of.source, np.uint32)
-        channel.time_us = struct.array("uint32_t", read.time_us & 0xFFFFFFFF, np.uint32)
-        channel.frame, channel.frames = struct.array("channel_frame_t", frames, bus.FRAME), len(frames)
-        channel.stride = STRIDE
-        channel.tau_m, channel.asked = struct.doubles(np.zeros(self.count)), struct.doubles(asked)
-        channel.health = struct.array("lever_health_t", health, health.dtype)
-        channel.estimate = struct.array("lever_estimate_t", estimate, estimate.dtype)
-        lib.channel_run(channel, estimator.pointer, 0, self.count)
-        return Record(health, estimate, asked, tuple(channel.result), len(frames), channel.unanswered)
+            flight.add_sensor("grip_force", force, self.noise["grip_force"])
+        struct, loop = flight.struct, flight.struct.pointer
+        for name, reading in read.of.items():
+            sensor = loop.sensor[getattr(lib, f"LOOP_{name.upper()}")]
+            sensor.source = struct.array("int64_t", reading.source, np.int64)
+            sensor.factor, sensor.error = struct.doubles(reading.factor), struct.doubles(reading.error)
+        loop.time_us = struct.array("uint32_t", read.time_us & 0xFFFFFFFF, np.uint32)
+        frames = sent.delivered()
+        loop.arrival, loop.arrivals = struct.array("loop_arrival_t", frames, bus.FRAME), len(frames)
+        flight.advance(self.count)
+        return flight

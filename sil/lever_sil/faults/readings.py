@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from .bus import Indices
 
 SIGNALS = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
-"""In the order of enum channel_signal."""
 STEP: Mapping[str, float] = {"theta": 0.1, "theta_dot": 0.2, "tau_m": 0.5, "z_ddot": 2.0, "grip_force": 20.0}
 """Of an offset that comes at once [rad, rad/s, N m, m/s^2, N]."""
 SPIKE: Mapping[str, float] = {"theta": 0.3, "theta_dot": 3.0, "tau_m": 1.5, "z_ddot": 10.0, "grip_force": 100.0}

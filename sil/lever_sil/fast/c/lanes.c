@@ -1,8 +1,7 @@
 #include "lanes.h"
 
-#include "lever_cdkf.h"
-
 #include <math.h>
+#include <stdbool.h>
 #include <stddef.h>
 
 static double at(const lane_column_t *column, uint32_t sample, uint32_t lane)
@@ -81,57 +80,4 @@ void lanes_move(const lanes_t *lanes, uint32_t first, uint32_t last)
 void lanes_advance(const lanes_t *lanes, uint32_t i, double begin, double end)
 {
     advance(lanes, i, 0u, begin, end);
-}
-
-/* --- with the firmware ------------------------------------------------------------------------------------------- */
-
-/* The firmware takes sample i. */
-static void take(const lanes_t *lanes, const lanes_loop_t *loop, uint32_t i, uint32_t lane)
-{
-    const size_t here = ((size_t)i * lanes->width) + lane;
-    const bool complete = (loop->lost[here] == 0u);
-    const lever_sample_t sample = {.time_us = i * loop->period_us,
-        .theta = (float)(lanes->theta[here] + at(&loop->noise[0], i, lane)),
-        .theta_dot = (float)(lanes->theta_dot[here] + at(&loop->noise[1], i, lane)),
-        .tau_m = (float)(loop->tau_m[here] + at(&loop->noise[2], i, lane)),
-        .z_ddot = (float)(at(&loop->z_ddot, i, lane) + at(&loop->noise[3], i, lane)),
-        .theta_valid = complete,
-        .theta_dot_valid = complete,
-        .tau_m_valid = complete,
-        .z_ddot_valid = true};
-    (void)lever_update(loop->lever[lane], &sample);
-    lever_health_t health;
-    lever_health(loop->lever[lane], &health);
-    loop->asked[lane] = (double)health.torque;
-}
-
-static void close_one(const lanes_t *lanes, const lanes_loop_t *loop, uint32_t i, uint32_t lane)
-{
-    const size_t here = ((size_t)i * lanes->width) + lane;
-    if ((i % loop->keep_alive) == 0u) {
-        (void)lever_command(loop->lever[lane], loop->command);
-    }
-    if ((loop->lost[here] == 0u) || !loop->loses_whole) {
-        take(lanes, loop, i, lane);
-    }
-    if ((i % loop->stride) == 0u) {
-        const size_t row = (loop->rows * lane) + (i / loop->stride);
-        lever_estimate(loop->lever[lane], &loop->estimate[row]);
-        lever_health(loop->lever[lane], &loop->health[row]);
-    }
-    if ((i + 1u) < lanes->count) {
-        const double asked = loop->asked[lane];
-        const double after = asked + ((loop->tau_m[here] - asked) * loop->decay);
-        advance(lanes, i, lane, loop->tau_m[here], after);
-        loop->tau_m[here + lanes->width] = after;
-    }
-}
-
-void lanes_close(const lanes_t *lanes, const lanes_loop_t *loop, uint32_t first, uint32_t last)
-{
-    for (uint32_t i = first; i < last; i++) {
-        for (uint32_t lane = 0u; lane < lanes->width; lane++) {
-            close_one(lanes, loop, i, lane);
-        }
-    }
 }

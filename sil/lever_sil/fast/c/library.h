@@ -2,7 +2,6 @@
 #ifndef LIBRARY_H
 #define LIBRARY_H
 
-#include "channel.h"
 #include "filters.h"
 #include "lanes.h"
 #include "loop.h"

@@ -1,5 +1,6 @@
 #include "loop.h"
 
+#include "arrivals.h"
 #include "can/e2e.h"
 #include "can/layout.h"
 #include "can/messages.h"
@@ -9,8 +10,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#define IDLE_US 5000u /* without a sample, after which the firmware is told so, as lever_idle() asks for */
-
 static bool has_command(const loop_t *loop)
 {
     return (loop->next_command < loop->commands) && (loop->command_sample[loop->next_command] == loop->sample);
@@ -18,20 +17,10 @@ static bool has_command(const loop_t *loop)
 
 /* --- by structs -------------------------------------------------------------------------------------------------- */
 
-/* There is no sample: as a port does. */
-static void idle(loop_t *loop, lever_t *lever)
-{
-    loop->idle_us += loop->period_us;
-    if (loop->idle_us >= IDLE_US) {
-        lever_idle(lever, loop->idle_us);
-        loop->idle_us = 0u;
-    }
-}
-
 /* Not rounded as in a frame; but what does not fit into one is not available. */
 static float reading_of(const loop_t *loop, enum loop_signal which, bool *valid)
 {
-    const double value = pilot_reading(loop, which);
+    const double value = pilot_reading(loop, which, loop->sample);
     *valid = pilot_fits(&loop->sensor[which].field, value);
     return *valid ? (float)value : 0.0f;
 }
@@ -43,10 +32,7 @@ static void step_by_struct(loop_t *loop, lever_t *lever)
         loop->next_command++;
     }
     if (loop->no_base[loop->sample] == 0u) {
-        lever_sample_t sample = {.time_us = loop->sample * loop->period_us};
-        if (loop->time_us != NULL) {
-            sample.time_us = loop->time_us[loop->sample];
-        }
+        lever_sample_t sample = {.time_us = pilot_time_us(loop, loop->sample)};
         if (loop->no_lever[loop->sample] == 0u) {
             sample.theta = reading_of(loop, LOOP_THETA, &sample.theta_valid);
             sample.theta_dot = reading_of(loop, LOOP_THETA_DOT, &sample.theta_dot_valid);
@@ -59,7 +45,7 @@ static void step_by_struct(loop_t *loop, lever_t *lever)
         (void)lever_update(lever, &sample);
         loop->idle_us = 0u;
     } else {
-        idle(loop, lever);
+        (void)arrivals_idle(loop, lever);
     }
     lever_health_t health;
     lever_health(lever, &health);
@@ -188,15 +174,15 @@ static void step_by_frames(loop_t *loop, lever_t *lever)
     }
     lever_frame_t frame;
     if (loop->no_lever[loop->sample] == 0u) {
-        pilot_lever_sample(loop, &frame);
+        pilot_lever_sample(loop, loop->sample, &frame);
         send_protected(loop, lever, &frame, MESSAGE_LEVER_SAMPLE_DATA_ID);
     }
     if (loop->has_grip) {
-        pilot_grip_sample(loop, &frame);
+        pilot_grip_sample(loop, loop->sample, &frame);
         send_protected(loop, lever, &frame, MESSAGE_GRIP_SAMPLE_DATA_ID);
     }
     if (loop->no_base[loop->sample] == 0u) {
-        pilot_base_sample(loop, &frame);
+        pilot_base_sample(loop, loop->sample, &frame);
         send_protected(loop, lever, &frame, MESSAGE_BASE_SAMPLE_DATA_ID);
         take_answer(loop);
         if (loop->recorder != NULL) {
@@ -213,23 +199,36 @@ static bool may_go_on(const loop_t *loop)
     return has_room && (loop->refused == 0u) && (loop->unanswered_in_a_row < loop->most_unanswered);
 }
 
+static void keep(loop_t *loop, const lever_t *lever)
+{
+    const uint32_t sample = loop->sample;
+    if ((sample % loop->stride) == 0u) {
+        lever_estimate(lever, &loop->estimate[sample / loop->stride]);
+        if (loop->stability != NULL) {
+            lever_stability(lever, &loop->stability[sample / loop->stride]);
+        }
+    }
+    if ((sample % loop->health_stride) == 0u) {
+        lever_health(lever, &loop->health[sample / loop->health_stride]);
+    }
+    if (loop->asked_of_motor != NULL) {
+        loop->asked_of_motor[sample] = loop->asked;
+    }
+}
+
 uint32_t loop_advance(loop_t *loop, lever_t *lever, uint32_t until)
 {
     while ((loop->sample < until) && may_go_on(loop)) {
         pilot_note(loop);
-        if (loop->by_frames) {
+        if (loop->arrival != NULL) {
+            arrivals_step(loop, lever);
+        } else if (loop->by_frames) {
             step_by_frames(loop, lever);
         } else {
             step_by_struct(loop, lever);
         }
         pilot_age_correction(loop);
-        if ((loop->sample % loop->stride) == 0u) {
-            lever_estimate(lever, &loop->estimate[loop->sample / loop->stride]);
-            lever_health(lever, &loop->health[loop->sample / loop->stride]);
-            if (loop->stability != NULL) {
-                lever_stability(lever, &loop->stability[loop->sample / loop->stride]);
-            }
-        }
+        keep(loop, lever);
         if ((loop->sample + 1u) < loop->count) {
             pilot_advance(loop);
         }

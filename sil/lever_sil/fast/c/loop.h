@@ -1,5 +1,6 @@
-/* The closed loop of a scenario at the speed of C, for Python: plant, sensors and firmware, sample by sample, as in
- * lever_sil/run/loop.py, from columns that are made beforehand.
+/* The closed loop at the speed of C, for Python: plant, sensors and firmware, sample by sample, from columns that are
+ * made beforehand. Of a scenario as in lever_sil/run/loop.py; of a lever of lever_sil/batch, also with frames that are
+ * lost, changed, late, repeated or foreign.
  *
  * The firmware is the caller's instance, used through its façade. Nothing here allocates.
  */
@@ -7,6 +8,7 @@
 #define LOOP_H
 
 #include "aircraft.h"
+#include "lanes.h"
 #include "plants.h"
 
 #include <stdbool.h>
@@ -46,6 +48,20 @@ typedef struct loop_sensor {
     loop_field_t field;
 } loop_sensor_t;
 
+enum loop_content { LOOP_LEVER_SAMPLE, LOOP_BASE_SAMPLE, LOOP_GRIP_SAMPLE, LOOP_OTHER };
+
+/* A frame that the firmware receives. */
+typedef struct loop_arrival {
+    uint32_t at;       /* sample at which it arrives */
+    uint32_t of;       /* sample that it carries */
+    uint32_t id;       /* identifier with which it arrives */
+    uint8_t content;   /* enum loop_content; of OTHER, `change` is its data */
+    uint8_t counter;   /* of E2E */
+    uint8_t data_id;   /* first of the DataIDList that its CRC is made with */
+    uint8_t length;    /* with which it arrives */
+    uint8_t change[8]; /* flips these bits on the way */
+} loop_arrival_t;
+
 /* A cabin that the lever moves. */
 typedef struct loop_cabin {
     bool exists; /* otherwise the base moves by itself */
@@ -65,25 +81,32 @@ typedef struct loop {
     bool by_frames;     /* encoded, with E2E protection; otherwise by structs */
     bool has_grip;      /* there is a sensor of the grip force */
     plant_t plant;
+    lanes_t *lanes; /* NULL: there is none. Otherwise its only lane moves in place of `plant`; the signals but for tau_m
+                       are its own or, of the grip force, given */
+    double motor_decay; /* with lanes: of the difference between torque and command, in a sample period */
     loop_cabin_t cabin; /* with one signal[LOOP_Z_DDOT], at the accelerometer, has its first value */
     loop_sensor_t sensor[LOOP_SIGNALS];
-    const double *base;                      /* measured z_ddot, without a cabin [m/s^2]; NaN: marked invalid */
+    const double *base;                      /* measured z_ddot [m/s^2]; NaN: marked invalid. NULL: by its sensor */
     loop_field_t torque_field;               /* of MOTOR_COMMAND */
     loop_field_t correction_field;           /* of CORRECTION */
     const uint8_t *no_lever;                 /* the frame is never sent */
     const uint8_t *no_base;                  /* likewise */
     struct lever_recorder *recorder;         /* by frames, sends snapshots; NULL: none does */
-    const uint32_t *time_us;                 /* by structs, of the samples; NULL: as they are */
+    const uint32_t *time_us;                 /* what the sender has for the time of the samples; NULL: as they are */
     const double *torque;                    /* asked of the motor besides what the firmware asks for [N m] */
     uint32_t commands;                       /* before which samples there is a COMMAND, */
     const uint32_t *command_sample;          /* rising, */
     const struct lever_command *command;     /* and which, by structs, */
     const struct lever_frame *command_frame; /* or by frames */
-    uint32_t stride;          /* estimate and health are kept after every so many-th sample, from the first on */
+    const loop_arrival_t *arrival;           /* by frames: all that arrive, with the COMMANDs; NULL: what is sent */
+    uint32_t arrivals;
+    uint32_t stride;          /* an estimate is kept after every so many-th sample, from the first on, */
+    uint32_t health_stride;   /* and health after every so many-th */
     uint32_t frame_room;      /* 0: frames are not kept */
     uint32_t most_unanswered; /* samples in a row without an estimate, that end the run */
     /* kept */
     double *signal[LOOP_SIGNALS]; /* the true values, at every sample */
+    double *asked_of_motor;       /* [N m]; NULL: not kept */
     struct lever_estimate *estimate;
     struct lever_health *health;
     struct lever_stability *stability; /* NULL: not kept */
@@ -91,6 +114,7 @@ typedef struct loop {
     uint32_t *frame_sample;
     uint8_t (*frame_data)[8];
     uint32_t frames;     /* and how many they are */
+    uint32_t result[4];  /* arrivals by enum lever_frame_result */
     uint32_t unanswered; /* samples without an estimate */
     uint32_t misplaced;  /* estimates of other samples */
     uint32_t refused;    /* commands */
@@ -98,7 +122,8 @@ typedef struct loop {
     uint32_t sample;
     uint32_t next_command;
     uint32_t unanswered_in_a_row;
-    uint32_t idle_us;   /* by structs: without a sample, since the firmware was told so */
+    uint32_t next_arrival;
+    uint32_t idle_us;   /* without a sample, since the firmware was told so; not by frames that are all sent */
     uint32_t silent_us; /* without a sample */
     double asked;       /* what the firmware asks of the motor [N m], */
     double correction;  /* and adds to the lever's angle that the flight control computer reads [rad] */

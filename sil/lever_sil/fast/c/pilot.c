@@ -22,12 +22,11 @@ static double reading(const loop_sensor_t *sensor, const double *signal, int64_t
     return (sensor->gain * value) + sensor->offset[sample];
 }
 
-double pilot_reading(const loop_t *loop, enum loop_signal which)
+double pilot_reading(const loop_t *loop, enum loop_signal which, uint32_t sample)
 {
     const loop_sensor_t *sensor = &loop->sensor[which];
-    const uint32_t sample = loop->sample;
     double value;
-    if ((which == LOOP_Z_DDOT) && !loop->cabin.exists) {
+    if ((which == LOOP_Z_DDOT) && (loop->base != NULL)) {
         value = loop->base[sample];
     } else if (sensor->source == NULL) {
         value = reading(sensor, loop->signal[which], (int64_t)sample);
@@ -38,13 +37,20 @@ double pilot_reading(const loop_t *loop, enum loop_signal which)
     return value;
 }
 
+uint32_t pilot_time_us(const loop_t *loop, uint32_t sample)
+{
+    return (loop->time_us != NULL) ? loop->time_us[sample] : (sample * loop->period_us);
+}
+
 void pilot_note(loop_t *loop)
 {
     const plant_t *plant = &loop->plant;
-    loop->signal[LOOP_THETA][loop->sample] = plant->theta;
-    loop->signal[LOOP_THETA_DOT][loop->sample] = plant->theta_dot;
-    loop->signal[LOOP_TAU_M][loop->sample] = plant->tau_m;
-    if (loop->has_grip) {
+    if (loop->lanes == NULL) {
+        loop->signal[LOOP_THETA][loop->sample] = plant->theta;
+        loop->signal[LOOP_THETA_DOT][loop->sample] = plant->theta_dot;
+        loop->signal[LOOP_TAU_M][loop->sample] = plant->tau_m;
+    }
+    if ((loop->lanes == NULL) && loop->has_grip) {
         loop->signal[LOOP_GRIP_FORCE][loop->sample] = plant->grip_force;
     }
 }
@@ -61,33 +67,33 @@ double pilot_rounded(const loop_field_t *field, double value)
     return rint(value / field->step) * field->step;
 }
 
-static float sent(const loop_t *loop, enum loop_signal which, bool *valid)
+static float sent(const loop_t *loop, enum loop_signal which, uint32_t sample, bool *valid)
 {
-    const double value = pilot_rounded(&loop->sensor[which].field, pilot_reading(loop, which));
+    const double value = pilot_rounded(&loop->sensor[which].field, pilot_reading(loop, which, sample));
     *valid = !isnan(value);
     return (float)value;
 }
 
-void pilot_lever_sample(const loop_t *loop, struct lever_frame *frame)
+void pilot_lever_sample(const loop_t *loop, uint32_t sample, struct lever_frame *frame)
 {
     message_lever_sample_t message;
-    message.theta = sent(loop, LOOP_THETA, &message.theta_valid);
-    message.theta_dot = sent(loop, LOOP_THETA_DOT, &message.theta_dot_valid);
-    message.tau_m = sent(loop, LOOP_TAU_M, &message.tau_m_valid);
+    message.theta = sent(loop, LOOP_THETA, sample, &message.theta_valid);
+    message.theta_dot = sent(loop, LOOP_THETA_DOT, sample, &message.theta_dot_valid);
+    message.tau_m = sent(loop, LOOP_TAU_M, sample, &message.tau_m_valid);
     (void)message_lever_sample_encode(frame, &message);
 }
 
-void pilot_base_sample(const loop_t *loop, struct lever_frame *frame)
+void pilot_base_sample(const loop_t *loop, uint32_t sample, struct lever_frame *frame)
 {
-    message_base_sample_t message = {.time_us = loop->sample * loop->period_us};
-    message.z_ddot = sent(loop, LOOP_Z_DDOT, &message.z_ddot_valid);
+    message_base_sample_t message = {.time_us = pilot_time_us(loop, sample)};
+    message.z_ddot = sent(loop, LOOP_Z_DDOT, sample, &message.z_ddot_valid);
     (void)message_base_sample_encode(frame, &message);
 }
 
-void pilot_grip_sample(const loop_t *loop, struct lever_frame *frame)
+void pilot_grip_sample(const loop_t *loop, uint32_t sample, struct lever_frame *frame)
 {
     message_grip_sample_t message;
-    message.grip_force = sent(loop, LOOP_GRIP_FORCE, &message.grip_force_valid);
+    message.grip_force = sent(loop, LOOP_GRIP_FORCE, sample, &message.grip_force_valid);
     (void)message_grip_sample_encode(frame, &message);
 }
 
@@ -114,10 +120,22 @@ static void advance_cabin(loop_t *loop)
     cabin->felt[now + 1u] = z_ddot[now + 1u] + (cabin->outside * cabin->speed);
 }
 
+/* A lever of lanes.h, with the motor's torque, to the next sample. */
+static void advance_lane(loop_t *loop)
+{
+    double *tau_m = &loop->signal[LOOP_TAU_M][loop->sample];
+    tau_m[1] = loop->asked + ((tau_m[0] - loop->asked) * loop->motor_decay);
+    lanes_advance(loop->lanes, loop->sample, tau_m[0], tau_m[1]);
+}
+
 void pilot_advance(loop_t *loop)
 {
     if (loop->cabin.exists) {
         advance_cabin(loop);
     }
-    plant_advance(&loop->plant, loop->sample, loop->asked + loop->torque[loop->sample]);
+    if (loop->lanes != NULL) {
+        advance_lane(loop);
+    } else {
+        plant_advance(&loop->plant, loop->sample, loop->asked + loop->torque[loop->sample]);
+    }
 }

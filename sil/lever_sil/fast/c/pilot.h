@@ -7,8 +7,11 @@
 /* Keeps the true signals of this sample, from which its sensors read. */
 void pilot_note(loop_t *loop);
 
-/* What a sensor reads at this sample, also of the base acceleration; NaN: it is marked invalid. */
-double pilot_reading(const loop_t *loop, enum loop_signal which);
+/* What a sensor reads at a sample up to this one; NaN: it is marked invalid. */
+double pilot_reading(const loop_t *loop, enum loop_signal which, uint32_t sample);
+
+/* What its sender says for the time of a sample [us]. */
+uint32_t pilot_time_us(const loop_t *loop, uint32_t sample);
 
 /* Whether a frame can carry a value; NaN does not fit. */
 bool pilot_fits(const loop_field_t *field, double value);
@@ -17,10 +20,10 @@ bool pilot_fits(const loop_field_t *field, double value);
  * firmware's codec then has nothing to round. */
 double pilot_rounded(const loop_field_t *field, double value);
 
-/* The readings of this sample as frames, without E2E protection. */
-void pilot_lever_sample(const loop_t *loop, struct lever_frame *frame);
-void pilot_base_sample(const loop_t *loop, struct lever_frame *frame);
-void pilot_grip_sample(const loop_t *loop, struct lever_frame *frame);
+/* The readings of a sample as frames, without E2E protection. */
+void pilot_lever_sample(const loop_t *loop, uint32_t sample, struct lever_frame *frame);
+void pilot_base_sample(const loop_t *loop, uint32_t sample, struct lever_frame *frame);
+void pilot_grip_sample(const loop_t *loop, uint32_t sample, struct lever_frame *frame);
 
 /* After this sample: a correction that is too old counts as none. */
 void pilot_age_correction(loop_t *loop);

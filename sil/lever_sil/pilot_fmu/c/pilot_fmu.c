@@ -233,12 +233,12 @@ static void put_framed(fmu_t *fmu, const loop_t *loop)
     message_lever_sample_t lever = {0};
     message_base_sample_t base = {0};
     message_grip_sample_t grip = {0};
-    pilot_lever_sample(loop, &frame);
+    pilot_lever_sample(loop, loop->sample, &frame);
     (void)message_lever_sample_decode(&lever, &frame);
-    pilot_base_sample(loop, &frame);
+    pilot_base_sample(loop, loop->sample, &frame);
     (void)message_base_sample_decode(&base, &frame);
     if (loop->has_grip) {
-        pilot_grip_sample(loop, &frame);
+        pilot_grip_sample(loop, loop->sample, &frame);
         (void)message_grip_sample_decode(&grip, &frame);
     }
     const bool has_lever = (loop->no_lever[loop->sample] == 0u);
@@ -252,7 +252,7 @@ static void put_framed(fmu_t *fmu, const loop_t *loop)
 /* What does not fit into a frame is not available. */
 static void put_reading(fmu_t *fmu, uint32_t at, const loop_t *loop, enum loop_signal which, bool is_sent)
 {
-    const double value = pilot_reading(loop, which);
+    const double value = pilot_reading(loop, which, loop->sample);
     put(fmu, at, value, is_sent && pilot_fits(&loop->sensor[which].field, value));
 }
 
