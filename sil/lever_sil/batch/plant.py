@@ -77,7 +77,8 @@ class Lanes:
     def only(self, lane: int) -> Lanes:
         """Return one of them."""
         columns = {each.name: getattr(self, each.name) for each in fields(self)}
-        return replace(self, **{name: of[:, [lane]] for name, of in columns.items() if isinstance(of, np.ndarray)})
+        own: dict[str, Any] = {name: of[:, [lane]] for name, of in columns.items() if isinstance(of, np.ndarray)}
+        return replace(self, **own)
 
 
 def beside(parts: list[Lanes]) -> Lanes:

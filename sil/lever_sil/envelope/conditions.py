@@ -10,7 +10,8 @@ from dataclasses import replace
 from ..acceptance.result import Limit
 from ..batch.firmware import ClosedLoop
 from ..batch.motions import EVENT, Motion
-from ..batch.sensors import Fault, Sensors
+from ..batch.sensors import INVALID, Sensors
+from ..plants.sensors import Fault, Reads, Scale, Spikes, Stuck
 from .condition import Condition
 
 _PARAMETERS = ("m_p", "c_p", "k_p")
@@ -41,6 +42,8 @@ QUIET = most("flagged", 2.0)
 _ALL_COVERED = tuple(least(f"{name} covered", 90.0) for name in ("f_n", "zeta", *_PARAMETERS))
 _OF_PARAMETERS = tuple(f"{name} {what}" for name in _PARAMETERS for what in ("rms", "covered"))
 NO_DITHER = Motion(dither=0.0)
+FAILING = {"start": EVENT, "end": EVENT + 10.0}
+"""When a sensor is wrong [s]."""
 
 _STEADY = (
     Condition("steady", "steady flight", limits=(*right(1.0), QUIET), also=_OF_PARAMETERS, quick=True),
@@ -118,7 +121,9 @@ _OUTAGES = (
         "base_invalid",
         "z̈ marked invalid for 0.2, 1, 3 and 10 s",
         limits=(*_within(3.0), most("learnt at once", 0.1)),
-        sensors=Sensors(faults=tuple(Fault("z_ddot", "invalid", *interval) for interval in _INVALID)),
+        sensors=Sensors(
+            faults=tuple(("z_ddot", Reads(value=INVALID, start=first, end=last)) for first, last in _INVALID)
+        ),
         start=25.0,
         events=_INVALID,
         also=("back",),
@@ -141,15 +146,14 @@ _OUTAGES = (
 )
 
 
-def _fault(name: str, title: str, what: str, kind: str, soon: float = 0.5, quick: bool = False) -> Condition:
+def _fault(name: str, title: str, what: str, fault: Fault, soon: float = 0.5, quick: bool = False) -> Condition:
     """Return a sensor that fails for 10 s without saying so."""
-    fault = Fault(what, kind, EVENT, EVENT + 10.0)
     learnt = "learnt" if soon == 0.5 else "learnt late"
     return Condition(
         name,
         title,
         limits=(most("to flag", soon), most(learnt, 0.1), most("back", 1.0)),
-        sensors=Sensors(faults=(fault,)),
+        sensors=Sensors(faults=((what, fault),)),
         start=fault.start,
         end=fault.end + 8.0,
         events=((fault.start, fault.end),),
@@ -160,7 +164,7 @@ def _fault(name: str, title: str, what: str, kind: str, soon: float = 0.5, quick
 
 def _missing(name: str, title: str, what: str) -> Condition:
     """Return a sensor that is not there."""
-    sensors = Sensors(faults=(Fault(what, "invalid"),))
+    sensors = Sensors(faults=((what, Reads(value=INVALID)),))
     return Condition(name, title, limits=(least("running", 99.0), *right(3.0, 85.0)), sensors=sensors)
 
 
@@ -189,16 +193,16 @@ def _next_pilot(name: str, title: str, seconds: float) -> Condition:
 
 
 _FAULTS = (
-    _fault("base_stuck", "z̈ stuck but “valid” for 10 s", "z_ddot", "stuck", quick=True),
-    _fault("base_zero", "z̈ zero but “valid” for 10 s", "z_ddot", "zero"),
-    _fault("base_sign", "z̈ of the wrong sign for 10 s", "z_ddot", "sign", 2.0),
-    _fault("theta_stuck", "θ stuck for 10 s", "theta", "stuck", quick=True),
-    _fault("theta_dot_stuck", "θ̇ stuck for 10 s", "theta_dot", "stuck"),
+    _fault("base_stuck", "z̈ stuck but “valid” for 10 s", "z_ddot", Stuck(**FAILING), quick=True),
+    _fault("base_zero", "z̈ zero but “valid” for 10 s", "z_ddot", Reads(value=0.0, **FAILING)),
+    _fault("base_sign", "z̈ of the wrong sign for 10 s", "z_ddot", Scale(factor=-1.0, **FAILING), 2.0),
+    _fault("theta_stuck", "θ stuck for 10 s", "theta", Stuck(**FAILING), quick=True),
+    _fault("theta_dot_stuck", "θ̇ stuck for 10 s", "theta_dot", Stuck(**FAILING)),
     Condition(
         "spikes",
         "1 % of the θ samples off by 0.3 rad",
         limits=(most("σ ratio", 1.2), *right(1.5)),
-        sensors=Sensors(faults=(Fault("theta", "spikes"),)),
+        sensors=Sensors(faults=(("theta", Spikes(share=0.01, size=0.3)),)),
         against="steady",
         quick=True,
     ),

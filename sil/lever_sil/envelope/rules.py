@@ -12,9 +12,10 @@ from dataclasses import replace
 from ..acceptance.result import Limit
 from ..batch.firmware import ClosedLoop
 from ..batch.motions import EVENT, Motion
-from ..batch.sensors import Fault, Sensors
+from ..batch.sensors import CLOCK, Sensors
+from ..plants.sensors import Fault, Late, Scale, Stuck
 from .condition import Condition
-from .conditions import QUIET, least, most, right
+from .conditions import FAILING, QUIET, least, most, right
 
 _G = 9.80665  # [m/s^2]
 _LONG = Motion(duration=140.0)  # 40 seeds, two runs each, from 20 s on: 2.7 h
@@ -122,7 +123,7 @@ _BLOCKS = (
             f"slow_blocks_{what}_stuck",
             f"{word} stuck but “valid” for 10 s, learn_period 0.1 s",
             limits=(most("to flag", 0.5),),
-            sensors=Sensors(faults=(Fault(what, "stuck", EVENT, EVENT + 10.0),)),
+            sensors=Sensors(faults=((what, Stuck(**FAILING)),)),
             settings=_SLOW,
             start=EVENT,
             end=EVENT + 18.0,
@@ -196,12 +197,12 @@ def _delay(rate: int) -> Condition:
     )
 
 
-def _silent(name: str, title: str, fault: Fault) -> Condition:
+def _silent(name: str, title: str, what: str, fault: Fault) -> Condition:
     return Condition(
         name,
         title,
         limits=(most("silent", 1.0, "worst"),),
-        sensors=Sensors(faults=(fault,)),
+        sensors=Sensors(faults=((what, fault),)),
         start=fault.start,
         events=((fault.start, fault.end),),
         also=("to flag", "silent share"),
@@ -211,11 +212,9 @@ def _silent(name: str, title: str, fault: Fault) -> Condition:
 _SENSORS = (
     _delay(1000),
     _delay(500),
-    _silent("torque_gain_0.7", "torque gain 0.7 for 10 s", Fault("tau_m", "gain", EVENT, EVENT + 10.0, 0.7)),
-    _silent("base_late_10ms", "accelerometer 10 ms late for 10 s", Fault("z_ddot", "late", EVENT, EVENT + 10.0, 0.01)),
-    _silent(
-        "clock_1.1", "the sender's clock 10 % fast for 10 s", Fault("clock_rate", "gain", EVENT, EVENT + 10.0, 1.1)
-    ),
+    _silent("torque_gain_0.7", "torque gain 0.7 for 10 s", "tau_m", Scale(factor=0.7, **FAILING)),
+    _silent("base_late_10ms", "accelerometer 10 ms late for 10 s", "z_ddot", Late(delay=0.01, **FAILING)),
+    _silent("clock_1.1", "the sender's clock 10 % fast for 10 s", CLOCK, Scale(factor=1.1, **FAILING)),
 )
 
 RULES = {row.name: row for row in (*_JUMPS, *_NO_CHANGE, *_FRICTION, *_BLOCKS, *_LOST, *_LARGE, *_SENSORS)}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..batch.closed_loop import Loop
 from ..batch.motions import PERIOD, Motion, columns, lanes, stream, truth
 from ..batch.plant import Lanes, grip_force
-from ..batch.sensors import GRIP_NOISE, NOISE
+from ..batch.sensors import GRIP_BIAS, GRIP_NOISE, NOISE
 from ..fast.library import lib
 from . import bus, readings
 from .bus import Bus, Interval
@@ -92,12 +92,12 @@ class Pilot:
     def _closed(self, force: FloatArray | None, config: Config, sent: Bus, read: Readings) -> Loop:
         flight = Loop(self.lanes, self.noise, config, health_stride=1)
         if force is not None:
-            flight.add_sensor("grip_force", force, self.noise["grip_force"])
+            flight.add_sensor("grip_force", force, GRIP_BIAS + self.noise["grip_force"])
         struct, loop = flight.struct, flight.struct.pointer
         for name, reading in read.of.items():
             sensor = loop.sensor[getattr(lib, f"LOOP_{name.upper()}")]
             sensor.source = struct.array("int64_t", reading.source, np.int64)
-            sensor.factor, sensor.error = struct.doubles(reading.factor), struct.doubles(reading.error)
+            sensor.factor, sensor.error = struct.doubles(reading.factor), struct.doubles(reading.offset)
         loop.time_us = struct.array("uint32_t", read.time_us & 0xFFFFFFFF, np.uint32)
         frames = sent.delivered()
         loop.arrival, loop.arrivals = struct.array("loop_arrival_t", frames, bus.FRAME), len(frames)

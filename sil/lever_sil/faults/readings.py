@@ -6,14 +6,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
+from ..plants import sensors
+from ..plants.sensors import Corruption
 from .bus import Indices
 
 SIGNALS = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
 STEP: Mapping[str, float] = {"theta": 0.1, "theta_dot": 0.2, "tau_m": 0.5, "z_ddot": 2.0, "grip_force": 20.0}
-"""Of an offset that comes at once [rad, rad/s, N m, m/s^2, N]."""
+"""Of an offset [rad, rad/s, N m, m/s^2, N]."""
 SPIKE: Mapping[str, float] = {"theta": 0.3, "theta_dot": 3.0, "tau_m": 1.5, "z_ddot": 10.0, "grip_force": 100.0}
 GREATEST: Mapping[str, float] = {
     "theta": 3.2767, "theta_dot": 16.3835, "tau_m": 32.767, "z_ddot": 32.767, "grip_force": 655.34
@@ -22,31 +23,20 @@ GREATEST: Mapping[str, float] = {
 
 
 @dataclass
-class Reading:
-    """Of one signal: factor * (true + noise) of the sample `source`, plus error; NaN is marked invalid."""
-
-    source: NDArray[np.uint32]
-    factor: FloatArray
-    error: FloatArray
-
-
-@dataclass
 class Readings:
     """Of all, and the sender's time [us]."""
 
-    of: dict[str, Reading]
+    of: dict[str, Corruption]
     time_us: NDArray[np.int64]
+    period: float
     random: np.random.Generator
 
     @classmethod
     def right(cls, count: int, period: float, random: np.random.Generator) -> Readings:
         """Without a fault."""
-        at = np.arange(count)
-        readings = {
-            name: Reading(at.astype(np.uint32), np.ones(count), np.full(count, 2.0 if name == "grip_force" else 0.0))
-            for name in SIGNALS
-        }
-        return cls(readings, at * round(period * 1e6), random)
+        return cls(
+            {name: Corruption.none(count) for name in SIGNALS}, np.arange(count) * round(period * 1e6), period, random
+        )
 
 
 Fault = Callable[[Readings, Indices], None]
@@ -57,66 +47,12 @@ def nothing(readings: Readings, during: Indices) -> None:
     """As it should be."""
 
 
-def stuck(signal: str) -> Fault:
-    """Hold the last value."""
+def wrong(fault: sensors.Fault, *signals: str) -> Fault:
+    """Let a sensor, or some, have a fault."""
 
     def spoil(readings: Readings, during: Indices) -> None:
-        readings.of[signal].source[during] = max(0, during[0] - 1)
-
-    return spoil
-
-
-def reads(signal: str, value: float) -> Fault:
-    """Have the signal read this value, whatever is true."""
-
-    def spoil(readings: Readings, during: Indices) -> None:
-        readings.of[signal].factor[during], readings.of[signal].error[during] = 0.0, value
-
-    return spoil
-
-
-def scaled(signal: str, factor: float) -> Fault:
-    """Change the gain of the signal by this factor."""
-
-    def spoil(readings: Readings, during: Indices) -> None:
-        readings.of[signal].factor[during] *= factor
-
-    return spoil
-
-
-def gain_drift(signal: str, factor: float) -> Fault:
-    """Let the gain of the signal go to this factor, at a steady rate."""
-
-    def spoil(readings: Readings, during: Indices) -> None:
-        readings.of[signal].factor[during] *= np.linspace(1.0, factor, len(during))
-
-    return spoil
-
-
-def step(signal: str) -> Fault:
-    """Add an offset at once."""
-
-    def spoil(readings: Readings, during: Indices) -> None:
-        readings.of[signal].error[during] += STEP[signal]
-
-    return spoil
-
-
-def drift(signal: str) -> Fault:
-    """Let an offset grow to that of step(), at a steady rate."""
-
-    def spoil(readings: Readings, during: Indices) -> None:
-        readings.of[signal].error[during] += STEP[signal] * np.linspace(0.0, 1.0, len(during))
-
-    return spoil
-
-
-def spikes(signal: str) -> Fault:
-    """Put one value in a hundred far off."""
-
-    def spoil(readings: Readings, during: Indices) -> None:
-        hit = during[readings.random.random(len(during)) < 0.01]
-        readings.of[signal].error[hit] += SPIKE[signal] * readings.random.choice((-1.0, 1.0), len(hit))
+        for signal in signals:
+            fault.corrupt(during, readings.of[signal], readings.period, readings.random)
 
     return spoil
 

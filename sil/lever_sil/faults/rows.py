@@ -14,14 +14,18 @@ from dataclasses import dataclass, field, replace
 from lever_cdkf.can import codec
 
 from ..batch.motions import PERIOD, Motion
+from ..plants import sensors
+from ..plants.sensors import Offset, Reads, Scale, Spikes, Stuck
 from . import bus, readings
 from .bus import Interval
 from .judge import Requirement
+from .readings import wrong
 
 MOTION = Motion(duration=40.0, dither=0.0)
 """The firmware makes the dither."""
 TIME = (15.0, 25.0)
 """Of the faults [s]."""
+_LASTS = TIME[1] - TIME[0]
 MESSAGES = (*bus.SAMPLES, "COMMAND")
 FROZEN = "_frozen"
 """End of the name of a row that is flown with frozen parameters."""
@@ -275,29 +279,33 @@ def _readings() -> Iterator[Row]:
             gone, still, sign, gain = Requirement(), *[Requirement(own, _GRIP_WRONG)] * 3
         # what moves the lever may be a step or a drift of an output, and a pilot's grip what a gain of it may be; what
         # the motor does is known
-        faults = {
-            "invalid": ("marked invalid", readings.reads(signal, math.nan), gone),
-            "not_available": ("NaN-coded but marked valid", readings.reads(signal, math.inf), gone),
-            "saturated": ("saturated", readings.reads(signal, readings.GREATEST[signal]), still if grip else gone),
-            "stuck": ("stuck", readings.stuck(signal), still),
-            "zero": ("zero", readings.reads(signal, 0.0), still),
-            "step": ("off by a step", readings.step(signal), Requirement()),
-            "drift": ("off by a ramp to the same", readings.drift(signal), Requirement()),
-            "sign": ("of the wrong sign", readings.scaled(signal, -1.0), sign),
-            "gain_half": ("half as large", readings.scaled(signal, 0.5), gain),
-            "gain_double": ("twice as large", readings.scaled(signal, 2.0), gain),
-            "gain_drift": ("gain going to 1.5", readings.gain_drift(signal, 1.5), Requirement()),
-            "spikes": ("1 % of the values far off", readings.spikes(signal), _SPIKES.get(signal, Requirement())),
+        greatest, offset = readings.GREATEST[signal], readings.STEP[signal]
+        spikes = Spikes(share=0.01, size=readings.SPIKE[signal])
+        faults: dict[str, tuple[str, sensors.Fault, Requirement]] = {
+            "invalid": ("marked invalid", Reads(value=math.nan), gone),
+            "not_available": ("NaN-coded but marked valid", Reads(value=math.inf), gone),
+            "saturated": ("saturated", Reads(value=greatest), still if grip else gone),
+            "stuck": ("stuck", Stuck(), still),
+            "zero": ("zero", Reads(value=0.0), still),
+            "step": ("off by a step", Offset(size=offset), Requirement()),
+            "drift": ("off by a ramp to the same", Offset(size=offset, over=_LASTS), Requirement()),
+            "sign": ("of the wrong sign", Scale(factor=-1.0), sign),
+            "gain_half": ("half as large", Scale(factor=0.5), gain),
+            "gain_double": ("twice as large", Scale(factor=2.0), gain),
+            "gain_drift": ("gain going to 1.5", Scale(factor=1.5, over=_LASTS), Requirement()),
+            "spikes": ("1 % of the values far off", spikes, _SPIKES.get(signal, Requirement())),
         }
-        for name, (title, spoil, requirement) in faults.items():
+        for name, (title, fault, requirement) in faults.items():
             quick = (signal, name) in (("theta", "stuck"), ("z_ddot", "sign"), ("tau_m", "invalid"))
-            yield Row(f"{signal}_{name}", f"{word} {title}", requirement, on_readings=spoil, grip=grip, quick=quick)
-    blind = readings.reads("theta", math.nan), readings.reads("theta_dot", math.nan)
-
-    def neither(read: readings.Readings, during: bus.Indices) -> None:
-        for spoil in blind:
-            spoil(read, during)
-
+            yield Row(
+                f"{signal}_{name}",
+                f"{word} {title}",
+                requirement,
+                on_readings=wrong(fault, signal),
+                grip=grip,
+                quick=quick,
+            )
+    neither = wrong(Reads(value=math.nan), "theta", "theta_dot")
     yield Row("outputs_invalid", "θ and θ̇ marked invalid", _BLIND, on_readings=neither)
 
 
@@ -356,7 +364,7 @@ def _from_power_on(row: Row) -> Row:
         name=f"{row.name}{FROM_POWER_ON}",
         title=f"{row.title}, from power-on",
         requirement=replace(requirement, flags=flags, within=requirement.within + later),
-        time=(0.0, TIME[1] - TIME[0]),
+        time=(0.0, _LASTS),
     )
 
 
@@ -373,10 +381,9 @@ def _coasting() -> Iterator[Row]:
     Torque has ended, and cannot be compared.
     """
     requirement = replace(_BLIND, flags=("BASE",), within=_STUCK)
-    faults = {"stuck": ("stuck", readings.stuck("z_ddot")), "zero": ("zero", readings.reads("z_ddot", 0.0))}
-    for name, (words, spoil) in faults.items():
-        title = f"z̈ {words} while no LEVER_SAMPLE comes"
-        yield Row(f"z_ddot_{name}_coasting", title, requirement, bus.lost("LEVER_SAMPLE", 1.1), spoil)
+    for name, fault in {"stuck": Stuck(), "zero": Reads(value=0.0)}.items():
+        title = f"z̈ {name} while no LEVER_SAMPLE comes"
+        yield Row(f"z_ddot_{name}_coasting", title, requirement, bus.lost("LEVER_SAMPLE", 1.1), wrong(fault, "z_ddot"))
 
 
 def _table() -> Iterator[Row]:

@@ -30,6 +30,11 @@ class Corruption:
     factor: FloatArray
     offset: FloatArray
 
+    @classmethod
+    def none(cls, count: int) -> Corruption:
+        """Return what leaves `count` readings as they are."""
+        return cls(np.arange(count), np.ones(count), np.zeros(count))
+
     def of(self, readings: FloatArray) -> FloatArray:
         """Return all readings with the faults in them."""
         return self.factor * readings[self.source] + self.offset
@@ -46,29 +51,93 @@ class Fault(ABC):
         if not self.start < self.end:
             raise ValueError(f"start {self.start:g} s is not before end {self.end:g} s")
 
+    def during(self, time: FloatArray) -> NDArray[np.intp]:
+        """Return the samples, at the times `time` [s], at which it acts."""
+        return np.flatnonzero((time >= self.start) & (time < self.end))
+
     @abstractmethod
-    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
-        """Add the fault to `corruption` at the samples `inside`, at least one."""
+    def corrupt(
+        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
+    ) -> None:
+        """Add the fault to `corruption` at the samples `inside`, at least one; `period` [s] is from one to the next."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stuck(Fault):
     """The last reading before, noise and all, over and over."""
 
-    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+    def corrupt(
+        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
+    ) -> None:
         """Repeat the last reading before the fault."""
         corruption.source[inside] = max(inside[0] - 1, 0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scale(Fault):
+class Reads(Fault):
+    """A reading of `value`, whatever is true."""
+
+    value: float = quantity(SIGNAL)
+
+    def corrupt(
+        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
+    ) -> None:
+        """Put the value in place of the readings."""
+        corruption.factor[inside], corruption.offset[inside] = 0.0, self.value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Late(Fault):
+    """The reading of `delay` before."""
+
+    delay: float = quantity("s", above=0.0)
+
+    def corrupt(
+        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
+    ) -> None:
+        """Read earlier samples, the nearest ones."""
+        corruption.source[inside] = np.maximum(inside - round(self.delay / period), 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gradual(Fault):
+    """Something that comes `over` some time, or at once."""
+
+    over: float = quantity("s", 0.0, least=0.0)
+
+    def reached(self, count: int, period: float) -> FloatArray:
+        """Return how much of it there is at each of `count` samples, from 0 to 1."""
+        if self.over == 0.0:
+            return np.ones(count)
+        reached: FloatArray = np.minimum(np.arange(count) * (period / self.over), 1.0)
+        return reached
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scale(Gradual):
     """The reading times `factor`: 0 of a dead sensor, -1 of one wired the wrong way round."""
 
     factor: float = quantity("1")
 
-    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+    def corrupt(
+        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
+    ) -> None:
         """Multiply the readings by `factor`."""
-        corruption.factor[inside] *= self.factor
+        reached = self.reached(len(inside), period)
+        corruption.factor[inside] *= (1.0 - reached) + self.factor * reached
+
+
+@dataclass(frozen=True, kw_only=True)
+class Offset(Gradual):
+    """The reading plus `size`."""
+
+    size: float = quantity(SIGNAL)
+
+    def corrupt(
+        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
+    ) -> None:
+        """Add `size` to the readings."""
+        corruption.offset[inside] += self.size * self.reached(len(inside), period)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,13 +147,17 @@ class Spikes(Fault):
     share: float = quantity("1", above=0.0, greatest=1.0)
     size: float = quantity(SIGNAL, above=0.0)
 
-    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+    def corrupt(
+        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
+    ) -> None:
         """Add or subtract `size` at random samples."""
-        hit = rng.random(len(inside)) < self.share
-        corruption.offset[inside] += hit * rng.choice((-self.size, self.size), len(inside))
+        hit = inside[rng.random(len(inside)) < self.share]
+        corruption.offset[hit] += self.size * rng.choice((-1.0, 1.0), len(hit))
 
 
-FAULTS: dict[str, type[Fault]] = {"stuck": Stuck, "scale": Scale, "spikes": Spikes}
+FAULTS: dict[str, type[Fault]] = {
+    "stuck": Stuck, "reads": Reads, "late": Late, "scale": Scale, "offset": Offset, "spikes": Spikes
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -119,15 +192,19 @@ class Sensor:
             delayed = np.interp(at, np.arange(len(signal)), signal)
         return (1.0 + self.gain_error) * delayed + self.offsets(len(signal), rng)
 
-    def corruption(self, time: FloatArray, rng: np.random.Generator) -> Corruption:
-        """Return what its faults do at the times `time` [s]."""
-        count = len(time)
-        corruption = Corruption(np.arange(count), np.ones(count), np.zeros(count))
-        for fault in self.fault:
-            inside = np.flatnonzero((time >= fault.start) & (time < fault.end))
-            if len(inside):
-                fault.corrupt(inside, corruption, rng)
-        return corruption
+    def corruption(self, time: FloatArray, period: float, rng: np.random.Generator) -> Corruption:
+        """Return what its faults do at the times `time` [s], a `period` apart."""
+        return corrupted(self.fault, time, period, rng)
+
+
+def corrupted(faults: Sequence[Fault], time: FloatArray, period: float, rng: np.random.Generator) -> Corruption:
+    """Return what faults make of the readings of one sensor at the times `time` [s], a `period` [s] apart."""
+    corruption = Corruption.none(len(time))
+    for fault in faults:
+        inside = fault.during(time)
+        if len(inside):
+            fault.corrupt(inside, corruption, period, rng)
+    return corruption
 
 
 @dataclass(frozen=True)

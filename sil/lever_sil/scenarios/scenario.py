@@ -202,7 +202,7 @@ class Scenario:
     def corruption(self, what: str, time: FloatArray) -> Corruption:
         """Return what the faults of the sensor of `what` (one of sensors.VALUES) do at the times `time` [s]."""
         sensor: Sensor = getattr(self.sensors, what)
-        return sensor.corruption(time, self.stream("fault", VALUES.index(what)))
+        return sensor.corruption(time, self.period, self.stream("fault", VALUES.index(what)))
 
     def truth(self, time: FloatArray) -> Truth:
         """Return the pilot on his lever at the times `time` [s]. Raise ScenarioError when he cannot be."""

@@ -9,11 +9,12 @@ from typing import Any
 import pytest
 from lever_sil.acceptance.result import Limit
 from lever_sil.batch.motions import Motion
-from lever_sil.batch.sensors import Sensors
+from lever_sil.batch.sensors import INVALID, Sensors
 from lever_sil.envelope.condition import Condition
 from lever_sil.envelope.conditions import CONDITIONS
 from lever_sil.envelope.measure import FIGURES
 from lever_sil.envelope.rules import RULES
+from lever_sil.plants.sensors import Late, Reads, Scale, Spikes, Stuck
 
 ALL = CONDITIONS | RULES
 COVERED = ", ".join(f"{name} covered ≥ 90" for name in ("f_n", "zeta", "m_p", "c_p", "k_p"))
@@ -207,26 +208,28 @@ def test_a_condition_is_as_required(name: str) -> None:
 
 def test_faults_are_as_required() -> None:
     faults = {name: condition.sensors.faults for name, condition in ALL.items() if condition.sensors.faults}
-    found = {
-        name: [(f.what, f.kind, f.start, f.end, *([f.size] if f.size != 1.0 else [])) for f in of]
-        for name, of in faults.items()
-    }
-    always, failing = (0.0, math.inf), (30.0, 40.0)
-    assert found == {
-        "base_invalid": [("z_ddot", "invalid", *interval) for interval in CONDITIONS["base_invalid"].events],
-        "base_stuck": [("z_ddot", "stuck", *failing)],
-        "base_zero": [("z_ddot", "zero", *failing)],
-        "base_sign": [("z_ddot", "sign", *failing)],
-        "theta_stuck": [("theta", "stuck", *failing)],
-        "theta_dot_stuck": [("theta_dot", "stuck", *failing)],
-        "spikes": [("theta", "spikes", *always)],
-        "only_theta": [("theta_dot", "invalid", *always)],
-        "only_rate": [("theta", "invalid", *always)],
-        "slow_blocks_theta_stuck": [("theta", "stuck", *failing)],
-        "slow_blocks_z_ddot_stuck": [("z_ddot", "stuck", *failing)],
-        "torque_gain_0.7": [("tau_m", "gain", *failing, 0.7)],
-        "base_late_10ms": [("z_ddot", "late", *failing, 0.01)],
-        "clock_1.1": [("clock_rate", "gain", *failing, 1.1)],
+    failing = {"start": 30.0, "end": 40.0}
+    outages = CONDITIONS["base_invalid"].events
+    assert faults.pop("base_invalid") == tuple(
+        ("z_ddot", Reads(value=INVALID, start=first, end=last)) for first, last in outages
+    )
+    assert faults.pop("only_theta") == (("theta_dot", Reads(value=INVALID)),)
+    assert faults.pop("only_rate") == (("theta", Reads(value=INVALID)),)
+    assert faults == {
+        name: (fault,)
+        for name, fault in {
+            "base_stuck": ("z_ddot", Stuck(**failing)),
+            "base_zero": ("z_ddot", Reads(value=0.0, **failing)),
+            "base_sign": ("z_ddot", Scale(factor=-1.0, **failing)),
+            "theta_stuck": ("theta", Stuck(**failing)),
+            "theta_dot_stuck": ("theta_dot", Stuck(**failing)),
+            "spikes": ("theta", Spikes(share=0.01, size=0.3)),
+            "slow_blocks_theta_stuck": ("theta", Stuck(**failing)),
+            "slow_blocks_z_ddot_stuck": ("z_ddot", Stuck(**failing)),
+            "torque_gain_0.7": ("tau_m", Scale(factor=0.7, **failing)),
+            "base_late_10ms": ("z_ddot", Late(delay=0.01, **failing)),
+            "clock_1.1": ("clock_rate", Scale(factor=1.1, **failing)),
+        }.items()
     }
     loops = {name: condition.closed_loop for name, condition in ALL.items() if condition.closed_loop}
     lost = {

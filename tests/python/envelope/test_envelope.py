@@ -15,10 +15,11 @@ from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
 from lever_sil.batch import firmware, motions, pilots, plant
 from lever_sil.batch.firmware import RESPONSE_STRIDE, Feedthrough, Track
 from lever_sil.batch.motions import Motion, Recording
-from lever_sil.batch.sensors import NOISE, Fault, Sensors, lost, measured
+from lever_sil.batch.sensors import CLOCK, INVALID, NOISE, Sensors, lost, measured
 from lever_sil.envelope import measure
 from lever_sil.envelope.measure import FIGURES, Outcome, fault_mask
 from lever_sil.plants import lever_plant as sil_plant
+from lever_sil.plants.sensors import Reads, Scale, Spikes, Stuck
 from lever_sil.plants.truth import Conditions
 from numpy.typing import NDArray
 
@@ -258,22 +259,29 @@ def test_the_sensor_of_the_grip_force_has_gain_bias_and_noise() -> None:
     assert np.std(gains[-1]) == pytest.approx(0.02, rel=0.4)
 
 
-@pytest.mark.parametrize(
-    ("kind", "expected"),
-    [
-        ("stuck", lambda clean: np.broadcast_to(clean[499], (500, 3))),
-        ("zero", lambda clean: np.zeros((500, 3))),
-        ("sign", lambda clean: -clean[500:1000]),
-        ("invalid", lambda clean: np.full((500, 3), np.nan)),
-        ("gain", lambda clean: 0.02 * clean[500:1000]),
-        ("late", lambda clean: clean[480:980]),
-    ],
-)
-def test_faults(kind: str, expected: Callable[[FloatArray], FloatArray]) -> None:
-    clean = measured(ramps(), Sensors(), SEEDS)["z_ddot"]
-    spoilt = measured(ramps(), Sensors(faults=(Fault("z_ddot", kind, 0.5, 1.0, 0.02),)), SEEDS)["z_ddot"]
-    np.testing.assert_array_equal(spoilt[500:1000], expected(clean))
-    np.testing.assert_array_equal(np.delete(spoilt, np.s_[500:1000], axis=0), np.delete(clean, np.s_[500:1000], axis=0))
+def test_faults_act_in_their_signal_in_every_run() -> None:
+    clean, window = measured(ramps(), Sensors(), SEEDS), {"start": 0.5, "end": 1.0}
+    faults = (
+        ("z_ddot", Stuck(**window)),
+        ("theta", Reads(value=INVALID, start=1.2)),
+        ("z_ddot", Scale(factor=-1.0, start=1.0)),
+    )
+    spoilt = measured(ramps(), Sensors(faults=faults), SEEDS)
+    expected = clean["z_ddot"].copy()
+    expected[500:1000], expected[1000:] = expected[499], -expected[1000:]
+    np.testing.assert_array_equal(spoilt["z_ddot"], expected)
+    np.testing.assert_array_equal(
+        np.isnan(spoilt["theta"]), np.broadcast_to(ramps().time[:, None] >= 1.2, (len(expected), 3))
+    )
+    np.testing.assert_array_equal(spoilt["theta_dot"], clean["theta_dot"])
+
+
+def test_spikes_are_others_in_each_run() -> None:
+    clean = measured(ramps(), Sensors(), SEEDS)["theta"]
+    spoilt = measured(ramps(), Sensors(faults=(("theta", Spikes(share=0.1, size=0.3)),)), SEEDS)["theta"]
+    hit = np.abs(spoilt - clean) > 0.2
+    assert np.all((hit.mean(axis=0) > 0.05) & (hit.mean(axis=0) < 0.15))
+    assert not np.array_equal(hit[:, 0], hit[:, 1])
 
 
 def test_lever_samples_are_lost_at_random_and_in_stretches() -> None:
@@ -295,7 +303,7 @@ def test_lever_samples_are_lost_at_random_and_in_stretches() -> None:
 def test_a_sample_comes_each_sample_period_and_has_the_time_of_its_senders_clock(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    signals = measured(ramps(2), Sensors(faults=(Fault("clock_rate", "gain", 0.5, 1.0, 1.1),)), range(2))
+    signals = measured(ramps(2), Sensors(faults=((CLOCK, Scale(factor=1.1, start=0.5, end=1.0)),)), range(2))
     fed = []
 
     def note(estimator: Estimator, samples: NDArray[Any], at: NDArray[np.int64]) -> tuple[NDArray[Any], NDArray[Any]]:

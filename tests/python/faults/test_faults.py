@@ -19,6 +19,7 @@ from lever_sil.batch.motions import PERIOD, STRIDE
 from lever_sil.faults import bus, faults_page, judge, matrix, readings, table
 from lever_sil.faults.flight import Pilot, Record
 from lever_sil.faults.rows import KNOWN, MOTION, ROWS, TIME
+from lever_sil.plants.sensors import Scale, Stuck
 from python.conftest import Refused
 
 
@@ -96,8 +97,10 @@ def test_readings_are_spoilt_as_the_fault_says() -> None:
         fault(right, np.array([2, 3]))
         return right
 
-    assert spoilt(readings.stuck("theta")).of["theta"].source.tolist() == [0, 1, 1, 1, 4, 5]
-    assert spoilt(readings.scaled("tau_m", -1.0)).of["tau_m"].factor.tolist() == [1, 1, -1, -1, 1, 1]
+    assert spoilt(readings.wrong(Stuck(), "theta")).of["theta"].source.tolist() == [0, 1, 1, 1, 4, 5]
+    both = spoilt(readings.wrong(Scale(factor=-1.0), "tau_m", "z_ddot")).of
+    assert both["tau_m"].factor.tolist() == both["z_ddot"].factor.tolist() == [1, 1, -1, -1, 1, 1]
+    assert both["theta"].factor.tolist() == [1] * 6
     assert spoilt(readings.clock(lambda t: 0.0 * t)).time_us.tolist() == [0, 1000, 2000, 2000, 4000, 5000]
     assert spoilt(readings.clock_offset(1.0)).time_us.tolist()[1:3] == [1000, 1002000]
 

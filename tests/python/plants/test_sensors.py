@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from lever_cdkf.can import codec
 from lever_cdkf.runtime.files import native_file
-from lever_sil.plants.sensors import Dropout, Fault, Scale, Sensor, Spikes, Stuck, missing
+from lever_sil.plants.sensors import Dropout, Fault, Late, Offset, Reads, Scale, Sensor, Spikes, Stuck, missing
 from numpy.typing import NDArray
 from scipy import stats
 
@@ -66,7 +66,7 @@ def test_only_the_dropouts_of_that_value_count_and_they_add_up() -> None:
 
 def faulty(*faults: Fault) -> NDArray[np.float64]:
     """Return what a sensor with these faults makes of the readings sin(t) + 2."""
-    return Sensor(fault=faults).corruption(TIME, rng()).of(np.sin(TIME) + 2.0)
+    return Sensor(fault=faults).corruption(TIME, PERIOD, rng()).of(np.sin(TIME) + 2.0)
 
 
 def test_faults_act_in_their_window_and_only_there() -> None:
@@ -78,10 +78,15 @@ def test_faults_act_in_their_window_and_only_there() -> None:
         (Scale(factor=0.0, **window), 0.0),
         (Scale(factor=-1.0, **window), -right[inside]),
         (Scale(factor=0.5, **window), 0.5 * right[inside]),
+        (Scale(factor=3.0, over=2.0, **window), (TIME[inside] - 4.0) * right[inside]),
+        (Offset(size=0.25, **window), right[inside] + 0.25),
+        (Offset(size=4.0, over=1.0, **window), right[inside] + np.minimum(4.0 * (TIME[inside] - 5.0), 4.0)),
+        (Reads(value=1.5, **window), 1.5),
+        (Late(delay=0.04, **window), np.sin(TIME[inside] - 0.04) + 2.0),
     ):
         found = faulty(fault)
         assert np.array_equal(found[~inside], right[~inside])
-        assert np.all(found[inside] == expected)
+        np.testing.assert_allclose(found[inside], np.broadcast_to(expected, inside.sum()), rtol=1e-12)
     both = faulty(Stuck(**window), Scale(factor=-1.0, start=6.0))
     assert np.all(both[inside] == np.where(TIME[inside] < 6.0, 1.0, -1.0) * right[4999])
     assert np.all(faulty(Stuck(end=1.0))[:1000] == right[0])

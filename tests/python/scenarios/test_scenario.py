@@ -187,7 +187,7 @@ def test_overrides_replace_values_with_or_without_quotes(load: Load) -> None:
         ),
         (
             LEAST + "[sensors]\ntheta = { fault = [{ kind = 'loose' }] }",
-            r"sensors.theta.fault\[0\]: must be a table with kind = one of stuck, scale, spikes",
+            r"sensors.theta.fault\[0\]: must be a table with kind = one of stuck, reads, late, scale, offset, spikes",
         ),
         (LEAST + "[[torque]]\nkind = 'sine'\nrms = '1 g'\nfrequency = '1 Hz'", r"torque\[0\].rms: '1 g' has unit 'g'"),
         (LEAST + "[[sensors.dropout]]\nwhat = 'all'\nshare = '1 %'", r"sensors.dropout\[0\].what: 'all' is not known"),

@@ -12,10 +12,11 @@ import pytest
 from lever_cdkf.cli.main import main
 from lever_sil.batch.firmware import ClosedLoop
 from lever_sil.batch.motions import FREQUENCIES, PERIOD, Motion
-from lever_sil.batch.sensors import Fault, Sensors
+from lever_sil.batch.sensors import INVALID, Sensors
 from lever_sil.envelope import conditions
 from lever_sil.envelope.condition import Condition
 from lever_sil.envelope.measure import FIGURES, Outcome
+from lever_sil.plants.sensors import Reads
 from lever_sil.study.baselines.joint_ekf import Joint
 from lever_sil.study.compare_envelope import filters, logs, run_estimators, tables
 from lever_sil.study.compare_envelope.run_estimators import ESTIMATORS, EstimatorResult
@@ -57,7 +58,7 @@ def test_conditions_are_filtered_together_where_a_batch_allows_it() -> None:
 
 def test_logs_say_what_the_sensors_said() -> None:
     short = Motion(duration=0.5)
-    invalid = Sensors(faults=(Fault("z_ddot", "invalid", 0.2, 0.3),))
+    invalid = Sensors(faults=(("z_ddot", Reads(value=INVALID, start=0.2, end=0.3)),))
     chunk = [Condition("a", "", short), Condition("b", "", short, sensors=invalid), Condition("c", "", short, runs=2)]
     first, second, third = logs.logs(chunk, 2)
     assert first.recording is second.recording
@@ -92,7 +93,10 @@ def test_movement_needs_the_high_pass() -> None:
 
 
 def test_steady_flight_does_not_and_missing_samples_are_skipped() -> None:
-    faults = (Fault("theta", "invalid", 1.0, 1.5), Fault("z_ddot", "invalid", 2.0, 2.2))
+    faults = (
+        ("theta", Reads(value=INVALID, start=1.0, end=1.5)),
+        ("z_ddot", Reads(value=INVALID, start=2.0, end=2.2)),
+    )
     (log,) = logs.logs([Condition("steady", "", SHORT, sensors=Sensors(faults=faults), start=4.0)], 2)
     for name in filters.JOINT_FILTERS:
         rms, covered = measured(log, name)
