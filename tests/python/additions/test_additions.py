@@ -30,7 +30,7 @@ rms = "0.1 g"
 frequency = "3 Hz"
 [sensors.theta]
 noise = "1 mrad"
-fault = [{ kind = "offset", by = "1 mrad", start = "2 s" }]
+fault = [{ kind = "lean", by = "1 mrad", start = "2 s" }]
 [limits]
 natural_frequency = "1000 %"
 """
@@ -109,16 +109,17 @@ KINDS: dict[str, type[Excitation]] = {
     "square": Square,'''
 FAULT = '''
 @dataclass(frozen=True, kw_only=True)
-class Offset(Fault):
+class Lean(Fault):
     """Off by so much."""
 
     by: float = quantity(SIGNAL)
 
-    def corrupt(self, inside, corruption, rng):
+    def corrupt(self, inside, corruption, period, rng):
         corruption.offset[inside] += self.by
 
 
-FAULTS: dict[str, type[Fault]] = {"offset": Offset, '''
+FAULTS: dict[str, type[Fault]] = {
+    "lean": Lean,'''
 BASELINE = '''
 """An estimator of the test: the first guess. Source: none."""
 
