@@ -8,6 +8,7 @@
 
 #define SECTIONS ((uint32_t)TRIM_SECTIONS)
 #define SETTLING_TURNS 0.9f   /* of the corner */
+#define UNSETTLED_MOST 2.0f   /* settling times, of outages in a row [sway_sample_100ms] */
 #define LINE_STEPS_MOST 24.0f /* of that line */
 
 /* The sections in units of the corner: 2 cos(pi / 12), 2 cos(3 pi / 12), 2 cos(5 pi / 12). */
@@ -73,7 +74,8 @@ float trim_settling_time(const trim_t *trim)
 
 void trim_unsettle(trim_t *trim)
 {
-    trim->unsettled = trim->deviations ? trim_settling_time(trim) : 0.0f;
+    const float time = trim_settling_time(trim);
+    trim->unsettled = trim->deviations ? lesser(greater(trim->unsettled, 0.0f) + time, UNSETTLED_MOST * time) : 0.0f;
 }
 
 /* The deviation of a value, `turn` = corner times period after the last one. */

@@ -114,6 +114,7 @@ class Estimator:
         self.missing = [seconds(0.0), seconds(0.0)]  # time since the last sample of θ, of θ̇
         self.last_output = [0.0, 0.0]
         self.base_missing, self.torque_missing = seconds(0.0), seconds(0.0)
+        self.unsettled = seconds(0.0)
         self._wait_for_levels()
         self.last_raw = start.input
         self.last_input = start.input  # the same, as deviations in preload trim
@@ -302,7 +303,8 @@ class Estimator:
         self.last_input, self.velocity = (0.0, 0.0), 0.0
 
     def _wait_for_levels(self) -> None:
-        self.unsettled = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
+        settling = seconds(SETTLING / self.settings["trim_corner"] if self.detrended else 0.0)
+        self.unsettled = min(max(self.unsettled, seconds(0.0)) + settling, 2 * settling)
 
     def _predict(self, u: tuple[float, ...], errors: Array, dt: float, force: Force | None) -> None:
         """Predict with the trim of the last sample. `errors` (3, 4): of the inputs, per unit of each considered

@@ -49,6 +49,16 @@ TEST(nothing_can_be_learnt_for_nine_tenths_of_the_corners_period)
     TEST_ASSERT_EQUAL_FLOAT(1.8f, trim.unsettled);
 }
 
+TEST(outages_in_a_row_add_up_to_twice_that_time)
+{
+    trim_start(&trim, 0.35f, 0.5f, true);
+    trim.unsettled = 1.0f;
+    trim_unsettle(&trim);
+    TEST_ASSERT_EQUAL_FLOAT(2.8f, trim.unsettled);
+    trim_unsettle(&trim);
+    TEST_ASSERT_EQUAL_FLOAT(3.6f, trim.unsettled);
+}
+
 /* --- outages ------------------------------------------------------------------------------------------------------ */
 
 /* So many samples with only theta_dot valid (1), only theta (0), or neither (2); the last answer of trim_outputs(). */
