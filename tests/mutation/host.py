@@ -122,6 +122,8 @@ def all_measured(folder: Path, jobs: int) -> list[TestFile]:
         for path, file in zip(paths, kept, strict=True):
             if not file.exists() or file.stat().st_mtime < (ROOT / path).stat().st_mtime:
                 pool.submit(measured, path, file)
+    if lacking := [str(path) for path, file in zip(paths, kept, strict=True) if not file.exists()]:
+        sys.exit(f"host: {', '.join(lacking)} did not end; run it by pytest, then this again")
     return [test_file(*json.loads(file.read_text())) for file in kept]
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import faulthandler
 import json
 import os
+import signal
 import time
 from collections.abc import Generator
 from pathlib import Path
@@ -75,6 +76,7 @@ class Selection:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)  # pytest leads its session: a test's pseudo-terminal would end it
     if "REACHED" in os.environ:
         config.pluginmanager.register(Reach(os.environ["REACHED"]))
     if "SELECTED" in os.environ:
