@@ -81,9 +81,9 @@ typedef struct loop {
     bool by_frames;     /* encoded, with E2E protection; otherwise by structs */
     bool has_grip;      /* there is a sensor of the grip force */
     plant_t plant;
-    lanes_t
-        *lanes; /* NULL: none. Otherwise its only lane moves in place of `plant`; of the signals tau_m is kept, theta
-                           and theta_dot are the lane's own arrays, and the others are given */
+    /* NULL: none. Otherwise its only lane moves in place of `plant`; of the signals tau_m is kept, theta and theta_dot are
+     * the lane's own arrays, and the others are given. */
+    lanes_t *lanes;
     double motor_decay; /* with lanes: of the difference between torque and command, in a sample period */
     loop_cabin_t cabin; /* with one signal[LOOP_Z_DDOT], at the accelerometer, has its first value */
     loop_sensor_t sensor[LOOP_SIGNALS];
