@@ -60,7 +60,7 @@ MAY_IMPORT = {
         *("acceptance", "batch", "envelope", "run", "fast", "scenarios", "plants", "aircraft"),
         *("firmware", "models", "report"),
     },
-    "lever_sil/faults": {"acceptance", "cli", "batch", "fast", "envelope", "firmware", "can", "report"},
+    "lever_sil/faults": {"acceptance", "cli", "batch", "fast", "envelope", "plants", "firmware", "can", "report"},
     "lever_sil/soak": {"cli", "fast", "run", "scenarios", "envelope", "faults", "firmware", "report"},
     "lever_sil/study": {
         *("cli", "run", "fast", "scenarios", "plants", "batch", "envelope"),

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from lever_cdkf.can import codec
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.estimator import Estimator
 from lever_cdkf.firmware.library import struct_dtype
@@ -68,7 +67,7 @@ class Loop:
         loop = self.struct.pointer
         loop.no_lever, loop.no_base = (self.struct.array("uint8_t", each, np.uint8) for each in (lever, base))
 
-    def command(self, samples: NDArray[np.intp], values: Sequence[Mapping[str, codec.Value]]) -> None:
+    def command(self, samples: NDArray[np.intp], values: Sequence[Mapping[str, float]]) -> None:
         """Have a COMMAND before each of these samples."""
         loop = self.struct.pointer
         loop.commands, loop.command_sample = len(samples), self.struct.array("uint32_t", samples, np.uint32)
