@@ -171,6 +171,16 @@ static bool is_spike(uint32_t i, float sigmas, float level)
 }
 
 /* R34 */
+TEST(a_rate_before_an_outage_says_nothing_of_motion_after_it)
+{
+    evidence_start(&evidence);
+    evidence_add_motion(&evidence, 1u, 1.0f, 0.001f, 1.0f);
+    evidence_add_motion(&evidence, 1u, 1.0f, TRIM_OUTAGE, 1.0f);
+    TEST_ASSERT_TRUE((evidence.motion.fast == 0.0f) && (evidence.motion.slow == 0.0f));
+    evidence_add_motion(&evidence, 1u, 1.0f, 0.001f, 1.0f);
+    TEST_ASSERT_TRUE((evidence.motion.fast > 0.0f) && (evidence.motion.slow > 0.0f));
+}
+
 TEST(an_output_beyond_eight_standard_deviations_is_refused)
 {
     for (uint32_t i = 0u; i < (uint32_t)CDKF_OUTPUTS; i++) {

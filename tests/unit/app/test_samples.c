@@ -280,6 +280,16 @@ TEST(an_estimate_is_of_the_time_that_a_late_accelerometer_shows)
     }
 }
 
+TEST(the_time_of_an_estimate_is_rounded_to_the_nearest_microsecond)
+{
+    config.settings.sample_period = 3.3333e-4f;
+    config.settings.z_ddot_delay = 3.0e-4f; /* one sample */
+    start();
+    const lever_sample_t sample = sample_after(1u);
+    (void)lever_update(lever, &sample);
+    TEST_ASSERT_EQUAL_UINT32(time_us - 333u, estimate().time_us);
+}
+
 /* What is left of a delay lies between two samples of the base: a ramp of it comes out where it is. */
 TEST(a_delay_between_two_samples_is_on_the_line_between_them)
 {

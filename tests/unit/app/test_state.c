@@ -356,9 +356,10 @@ TEST(a_belief_that_would_overflow_or_is_no_factor_is_refused)
     fly(50u);
     cdkf_t *cdkf = &lever->estimator.cdkf;
     snapshot_t *kept = lever->estimator.learning.kept;
-    float *const value[] = {&cdkf->growth, &cdkf->growth, &kept[0].s_ww[0], &kept[1].s_ww[0], &cdkf->s[5],
-        &cdkf->s_xx[1], &cdkf->considered[1].w[0], &cdkf->s[4], &cdkf->s_xx[3]};
-    static const float wrong[] = {-1.0f, 1.0e7f, 1.0e12f, 1.0e12f, 1.0e-3f, -1.0e-3f, 2.0e6f, -1.0e-3f, -1.0e-3f};
+    float *const value[] = {&cdkf->growth, &cdkf->growth, &kept[0].s_ww[0], &kept[1].s_ww[0], &kept[0].s_ww[2],
+        &kept[1].s_ww[5], &cdkf->s[5], &cdkf->s_xx[1], &cdkf->considered[1].w[0], &cdkf->s[4], &cdkf->s_xx[3]};
+    static const float wrong[] = {
+        -1.0f, 1.0e7f, 1.0e12f, 1.0e12f, -1.0e-3f, -1.0e-3f, 1.0e-3f, -1.0e-3f, 2.0e6f, -1.0e-3f, -1.0e-3f};
     for (uint32_t i = 0u; i < (uint32_t)(sizeof wrong / sizeof wrong[0]); i++) {
         const float right = *value[i];
         *value[i] = wrong[i];

@@ -151,6 +151,23 @@ TEST(settings_become_times_and_slopes)
     }
 }
 
+/* However small it is: 40 ms, less the time of torque below a micronewton metre. */
+TEST(a_gate_that_closes_ends_small_torque_in_40_ms_and_none_later)
+{
+    static const float torque[] = {1.2e-6f, 1.0e-40f};
+    for (uint32_t i = 0u; i < 2u; i++) {
+        torque_gate_t gate;
+        torque_gate_init(&gate, &config.settings);
+        gate.open = true;
+        gate.torque = torque[i];
+        torque_gate_close(&gate);
+        torque_gate_idle(&gate, 36000u);
+        TEST_ASSERT_TRUE((gate.torque > 0.0f) == (i == 0u));
+        torque_gate_idle(&gate, 5000u);
+        TEST_ASSERT_TRUE(gate.torque == 0.0f);
+    }
+}
+
 /* A second after the last COMMAND, and not a microsecond sooner. */
 TEST(without_commands_torque_is_abandoned_after_a_second)
 {
