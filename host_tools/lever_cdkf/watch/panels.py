@@ -156,7 +156,6 @@ def health(picture: Picture, source: Source) -> Table:
     """Mode, faults in words, counts, and how well it can learn."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
-    table.add_column()
     faults = status.faults(picture)
     style = "yellow" if faults else "green"
     counts = picture.counts

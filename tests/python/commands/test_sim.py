@@ -34,6 +34,11 @@ def test_sim_writes_its_files_and_prints_its_tables(lever: Run, tmp_path: Path) 
     assert "<html" in (out_dir / "report.html").read_text()[:200]
     title, run, _ = json.loads(tables.read_text()).values()
     assert [row["quantity"] for row in title] == list(summary["parameters"])
+    for row in title:
+        entry = summary["parameters"][row["quantity"]]
+        assert row["rms error [%]"] == pytest.approx(entry["rms_percent"])
+        assert row["bias [%]"] == pytest.approx(entry["bias_percent"])
+        assert row["truth within 2 sigma [1]"] == pytest.approx(entry["coverage_2sigma"])
     assert run[0]["samples"] == 1000
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -120,6 +121,7 @@ def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert rows["missed"]["runs"] == 2
     printed = capsys.readouterr().out
     assert "0 of 2 conditions hold. Missed: missed, unknown." in printed
+    assert re.search(r"^reported +reported ", printed, re.MULTILINE)
     assert table.MISSED in printed
 
 
