@@ -102,8 +102,8 @@ bool trim_is_waiting(const trim_t *trim, uint32_t i);
 /* Time in which the levels settle [s]. */
 float trim_settling_time(const trim_t *trim);
 
-/* The levels are guesses: in preload trim nothing can be learnt until they have settled. What was left to settle comes on
- * top, up to twice the time. */
+/* The levels are guesses: in preload trim nothing can be learnt until they have settled. What was left to settle comes
+ * on top, up to twice the time. */
 void trim_unsettle(trim_t *trim);
 
 #endif

@@ -40,7 +40,7 @@ class Loop:
         }  # fmt: skip
         """True ones: torque that acts [N m], and those of Lanes."""
         self.asked = np.zeros(self.count)
-        """Of the motor, at every sample [N m]."""
+        """The torque that the firmware asks of the motor, at every sample [N m]."""
         self.estimate = np.zeros((self.count - 1) // STRIDE + 1, struct_dtype("lever_estimate_t"))
         """At every STRIDE-th sample."""
         self.health = np.zeros((self.count - 1) // health_stride + 1, struct_dtype("lever_health_t"))

@@ -74,9 +74,9 @@ def measured(recording: Recording, given: Sensors, seeds: Sequence[int]) -> dict
     if any(what == CLOCK for what, _ in given.faults):
         signals[CLOCK] = np.ones_like(recording.theta)
     for what in dict.fromkeys(what for what, _ in given.faults):
-        own = [fault for signal, fault in given.faults if signal == what]
+        sensor = sensors.Sensor(fault=tuple(fault for signal, fault in given.faults if signal == what))
         for run, seed in enumerate(seeds):
-            corruption = sensors.corrupted(own, recording.time, PERIOD, stream("spikes", seed))
+            corruption = sensor.corruption(recording.time, PERIOD, stream("spikes", seed))
             signals[what][:, run] = corruption.of(signals[what][:, run])
     if given.lever_lost:
         gone = lost(seeds, len(recording.time), given.lever_lost)

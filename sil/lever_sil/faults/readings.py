@@ -14,7 +14,7 @@ from .bus import Indices
 
 SIGNALS = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
 STEP: Mapping[str, float] = {"theta": 0.1, "theta_dot": 0.2, "tau_m": 0.5, "z_ddot": 2.0, "grip_force": 20.0}
-"""Of an offset [rad, rad/s, N m, m/s^2, N]."""
+"""The offset that a sensor gets [rad, rad/s, N m, m/s^2, N]."""
 SPIKE: Mapping[str, float] = {"theta": 0.3, "theta_dot": 3.0, "tau_m": 1.5, "z_ddot": 10.0, "grip_force": 100.0}
 GREATEST: Mapping[str, float] = {
     "theta": 3.2767, "theta_dot": 16.3835, "tau_m": 32.767, "z_ddot": 32.767, "grip_force": 655.34
@@ -28,14 +28,13 @@ class Readings:
 
     of: dict[str, Corruption]
     time_us: NDArray[np.int64]
-    period: float
     random: np.random.Generator
 
     @classmethod
     def right(cls, count: int, period: float, random: np.random.Generator) -> Readings:
         """Without a fault."""
         return cls(
-            {name: Corruption.none(count) for name in SIGNALS}, np.arange(count) * round(period * 1e6), period, random
+            {name: Corruption.none(count, period) for name in SIGNALS}, np.arange(count) * round(period * 1e6), random
         )
 
 
@@ -52,7 +51,7 @@ def wrong(fault: sensors.Fault, *signals: str) -> Fault:
 
     def spoil(readings: Readings, during: Indices) -> None:
         for signal in signals:
-            fault.corrupt(during, readings.of[signal], readings.period, readings.random)
+            fault.corrupt(during, readings.of[signal], readings.random)
 
     return spoil
 

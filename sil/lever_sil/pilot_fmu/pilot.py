@@ -17,7 +17,9 @@ from lever_cdkf.fmu.variables import Variable, read_table
 from ..scenarios.scenario import Scenario
 from .columns import packed, truths
 
-_LOOP = (*("aircraft.c", "aircraft.h", "lanes.c", "lanes.h", "loop.h", "pilot.c", "pilot.h", "plants.c", "plants.h"),)
+_LOOP = (
+    "aircraft.c", "aircraft.h", "lanes.c", "lanes.h", "loop.h", "pilot.c", "pilot.h", "plants.c", "plants.h"
+)  # fmt: skip
 _CAN = ("can/e2e.c", "can/layout.c", "can/messages.c", "can/messages_sample.c")
 
 

@@ -29,11 +29,13 @@ class Corruption:
     source: NDArray[np.intp]
     factor: FloatArray
     offset: FloatArray
+    period: float
+    """From sample to sample [s]."""
 
     @classmethod
-    def none(cls, count: int) -> Corruption:
+    def none(cls, count: int, period: float) -> Corruption:
         """Return what leaves `count` readings as they are."""
-        return cls(np.arange(count), np.ones(count), np.zeros(count))
+        return cls(np.arange(count), np.ones(count), np.zeros(count), period)
 
     def of(self, readings: FloatArray) -> FloatArray:
         """Return all readings with the faults in them."""
@@ -51,24 +53,16 @@ class Fault(ABC):
         if not self.start < self.end:
             raise ValueError(f"start {self.start:g} s is not before end {self.end:g} s")
 
-    def during(self, time: FloatArray) -> NDArray[np.intp]:
-        """Return the samples, at the times `time` [s], at which it acts."""
-        return np.flatnonzero((time >= self.start) & (time < self.end))
-
     @abstractmethod
-    def corrupt(
-        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
-    ) -> None:
-        """Add the fault to `corruption` at the samples `inside`, at least one; `period` [s] is from one to the next."""
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
+        """Add the fault to `corruption` at the samples `inside`, at least one."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stuck(Fault):
     """The last reading before, noise and all, over and over."""
 
-    def corrupt(
-        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
-    ) -> None:
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
         """Repeat the last reading before the fault."""
         corruption.source[inside] = max(inside[0] - 1, 0)
 
@@ -79,9 +73,7 @@ class Reads(Fault):
 
     value: float = quantity(SIGNAL)
 
-    def corrupt(
-        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
-    ) -> None:
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
         """Put the value in place of the readings."""
         corruption.factor[inside], corruption.offset[inside] = 0.0, self.value
 
@@ -92,11 +84,9 @@ class Late(Fault):
 
     delay: float = quantity("s", above=0.0)
 
-    def corrupt(
-        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
-    ) -> None:
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
         """Read earlier samples, the nearest ones."""
-        corruption.source[inside] = np.maximum(inside - round(self.delay / period), 0)
+        corruption.source[inside] = np.maximum(inside - round(self.delay / corruption.period), 0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,11 +109,9 @@ class Scale(Gradual):
 
     factor: float = quantity("1")
 
-    def corrupt(
-        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
-    ) -> None:
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
         """Multiply the readings by `factor`."""
-        reached = self.reached(len(inside), period)
+        reached = self.reached(len(inside), corruption.period)
         corruption.factor[inside] *= (1.0 - reached) + self.factor * reached
 
 
@@ -133,11 +121,9 @@ class Offset(Gradual):
 
     size: float = quantity(SIGNAL)
 
-    def corrupt(
-        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
-    ) -> None:
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
         """Add `size` to the readings."""
-        corruption.offset[inside] += self.size * self.reached(len(inside), period)
+        corruption.offset[inside] += self.size * self.reached(len(inside), corruption.period)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,9 +133,7 @@ class Spikes(Fault):
     share: float = quantity("1", above=0.0, greatest=1.0)
     size: float = quantity(SIGNAL, above=0.0)
 
-    def corrupt(
-        self, inside: NDArray[np.intp], corruption: Corruption, period: float, rng: np.random.Generator
-    ) -> None:
+    def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
         """Add or subtract `size` at random samples."""
         hit = inside[rng.random(len(inside)) < self.share]
         corruption.offset[hit] += self.size * rng.choice((-1.0, 1.0), len(hit))
@@ -194,17 +178,12 @@ class Sensor:
 
     def corruption(self, time: FloatArray, period: float, rng: np.random.Generator) -> Corruption:
         """Return what its faults do at the times `time` [s], a `period` apart."""
-        return corrupted(self.fault, time, period, rng)
-
-
-def corrupted(faults: Sequence[Fault], time: FloatArray, period: float, rng: np.random.Generator) -> Corruption:
-    """Return what faults make of the readings of one sensor at the times `time` [s], a `period` [s] apart."""
-    corruption = Corruption.none(len(time))
-    for fault in faults:
-        inside = fault.during(time)
-        if len(inside):
-            fault.corrupt(inside, corruption, period, rng)
-    return corruption
+        corruption = Corruption.none(len(time), period)
+        for fault in self.fault:
+            inside = np.flatnonzero((time >= fault.start) & (time < fault.end))
+            if len(inside):
+                fault.corrupt(inside, corruption, rng)
+        return corruption
 
 
 @dataclass(frozen=True)

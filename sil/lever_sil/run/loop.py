@@ -419,7 +419,7 @@ def _reader(
 
 def _corrupted(reader: Callable[[int], float], corruption: sensors.Corruption) -> Callable[[int], float]:
     """Return what `reader` reads, with the faults in it; as Corruption.of() otherwise."""
-    source, factor, offset = (column.tolist() for column in vars(corruption).values())
+    source, factor, offset = (column.tolist() for column in (corruption.source, corruption.factor, corruption.offset))
     return lambda sample: factor[sample] * reader(source[sample]) + offset[sample]
 
 

@@ -114,7 +114,7 @@ class Lean(Fault):
 
     by: float = quantity(SIGNAL)
 
-    def corrupt(self, inside, corruption, period, rng):
+    def corrupt(self, inside, corruption, rng):
         corruption.offset[inside] += self.by
 
 

@@ -1,4 +1,4 @@
-/* What arrives at the firmware of a loop.h, where that is more or less than what is sent. */
+/* The frames that arrive at the firmware of a loop.h, where they are not those that are sent. */
 #ifndef ARRIVALS_H
 #define ARRIVALS_H
 

@@ -49,9 +49,9 @@ void pilot_note(loop_t *loop)
         loop->signal[LOOP_THETA][loop->sample] = plant->theta;
         loop->signal[LOOP_THETA_DOT][loop->sample] = plant->theta_dot;
         loop->signal[LOOP_TAU_M][loop->sample] = plant->tau_m;
-    }
-    if ((loop->lanes == NULL) && loop->has_grip) {
-        loop->signal[LOOP_GRIP_FORCE][loop->sample] = plant->grip_force;
+        if (loop->has_grip) {
+            loop->signal[LOOP_GRIP_FORCE][loop->sample] = plant->grip_force;
+        }
     }
 }
 

@@ -7,10 +7,10 @@
 /* Keeps the true signals of this sample, from which its sensors read. */
 void pilot_note(loop_t *loop);
 
-/* What a sensor reads at a sample up to this one; NaN: it is marked invalid. */
+/* Returns the reading of a sensor at a sample up to this one; NaN: it is marked invalid. */
 double pilot_reading(const loop_t *loop, enum loop_signal which, uint32_t sample);
 
-/* What its sender says for the time of a sample [us]. */
+/* Returns the time that the sender of a sample gives it [us]. */
 uint32_t pilot_time_us(const loop_t *loop, uint32_t sample);
 
 /* Whether a frame can carry a value; NaN does not fit. */
