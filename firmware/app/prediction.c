@@ -119,13 +119,12 @@ static void cross_gap(
     }
 }
 
-/* Returns for how long an input has been missing. After an outage its level has to settle again. */
-static float follow_input(trim_t *trim, bool valid, float missing, float elapsed)
+/* Counts for how long an input has been missing. Returns true at the end of an outage. */
+static bool follow_input(float *missing, bool valid, float elapsed)
 {
-    if (valid && (missing > TRIM_OUTAGE)) {
-        trim_unsettle(trim);
-    }
-    return valid ? 0.0f : (missing + elapsed);
+    const bool back = valid && (*missing > TRIM_OUTAGE);
+    *missing = valid ? 0.0f : (*missing + elapsed);
+    return back;
 }
 
 /* An angle that has jumped while the rate went on, and stays there, has another offset: its level takes it. */
@@ -169,14 +168,20 @@ void prediction_advance(
         period = elapsed / (float)substeps;
         cross_gap(estimator, sample, last, period, substeps);
     }
-    estimator->base_missing = follow_input(&estimator->trim, sample->base, estimator->base_missing, elapsed);
-    estimator->torque_missing = follow_input(&estimator->trim, sample->torque, estimator->torque_missing, elapsed);
+    const bool base_back = follow_input(&estimator->base_missing, sample->base, elapsed);
+    const bool torque_back = follow_input(&estimator->torque_missing, sample->torque, elapsed);
+    const bool input_back = base_back || torque_back;
+    if (input_back) {
+        trim_unsettle(&estimator->trim);
+    }
     predict(estimator, sample->z_ddot, sample->tau_m, sample->gripped ? &sample->grip_force : NULL, period);
     refuse_spikes(estimator, sample, elapsed);
     evidence_add_outputs(&estimator->learning.evidence, estimator->trim.last, sample->y,
         sample->valid[0] && sample->valid[1], elapsed, estimator->setup.settings->sample_period);
     if (subtract_trim(estimator, sample->y, sample->valid, period)) {
-        trim_unsettle(&estimator->trim);
+        if (!input_back) { /* signals that are back together were out once */
+            trim_unsettle(&estimator->trim);
+        }
         estimator->learning.evidence.offset = 0.0f; /* the angle is what it is now */
     }
 }

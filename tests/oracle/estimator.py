@@ -143,10 +143,16 @@ class Estimator:
         dt, none_valid = duration / substeps, np.zeros(2, np.bool_)
         base = u[0] / self.settings["z_ddot_gain"] if base_valid else self.last_raw[0]
         inputs = (base, u[1] / self.settings["tau_m_gain"] if torque_valid else self.last_raw[1])
+        inputs_back = False
         for i in range(1, substeps + 1):
             if i == substeps:
-                self.base_missing = self._follow(base_valid, self.base_missing, duration)
-                self.torque_missing = self._follow(torque_valid, self.torque_missing, duration)
+                inputs_back = (base_valid and self.base_missing > OUTAGE) or (
+                    torque_valid and self.torque_missing > OUTAGE
+                )
+                self.base_missing = seconds(0.0) if base_valid else self.base_missing + counted(duration)
+                self.torque_missing = seconds(0.0) if torque_valid else self.torque_missing + counted(duration)
+                if inputs_back:
+                    self._wait_for_levels()
             share = i / substeps
             last = self.last_raw
             between = (last[0] + share * (inputs[0] - last[0]), last[1] + share * (inputs[1] - last[1]))
@@ -156,7 +162,7 @@ class Estimator:
         self.time, self.last_raw = time, inputs
         valid = valid & ~self._are_spikes(y, valid, duration)
         y, back = self._subtract_trim(y, valid, dt)
-        if back:
+        if back and not inputs_back:
             self._wait_for_levels()
         self._correct(y, valid, duration)
         self._average_motion(y, valid, duration)
@@ -205,12 +211,6 @@ class Estimator:
             self.refused[i] = self.refused[i] + counted(duration) if far[i] else seconds(0.0)
         spikes: NDArray[np.bool_] = far & (np.array(self.refused) < seconds(SPIKE_TIME))
         return spikes
-
-    def _follow(self, valid: bool, missing: np.float32, duration: float) -> np.float32:
-        """Return for how long an input has been missing [s]. Its level has to settle again after an outage."""
-        if valid and missing > OUTAGE:
-            self._wait_for_levels()
-        return seconds(0.0) if valid else missing + counted(duration)
 
     def _knows_inputs(self) -> bool:
         return bool(self.base_missing <= 0.0 and self.torque_missing <= 0.0)

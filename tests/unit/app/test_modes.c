@@ -143,6 +143,23 @@ TEST(levels_settle_for_the_whole_of_their_time_after_a_gap)
 }
 
 /* R29 */
+TEST(signals_that_are_back_together_were_out_once)
+{
+    run_for(3000u);
+    for (uint32_t k = 0u; k < 30u; k++) {
+        lever_sample_t sample = sample_blind();
+        sample.z_ddot_valid = false;
+        (void)lever_update(lever, &sample);
+    }
+    for (uint32_t k = 0u; k < 900u; k++) {
+        (void)run(1u);
+        TEST_ASSERT_TRUE(has_fault(LEVER_FAULT_SETTLING));
+    }
+    (void)run(2u);
+    TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_SETTLING));
+}
+
+/* R29 */
 TEST(the_first_sample_after_alignment_says_that_levels_settle)
 {
     run_for(3000u);
