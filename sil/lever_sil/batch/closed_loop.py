@@ -22,7 +22,7 @@ MOTOR_LAG = 2e-3
 """Time constant with which the motor's torque follows the firmware's [s]."""
 
 
-class Loop:
+class LaneLoop:
     """One run of a lever, its sensors and the firmware."""
 
     def __init__(self, given: Lanes, noise: Mapping[str, FloatArray], config: Config, health_stride: int) -> None:

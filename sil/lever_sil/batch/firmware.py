@@ -15,7 +15,7 @@ from lever_cdkf.firmware.library import lib as firmware_lib
 from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
-from .closed_loop import Loop
+from .closed_loop import LaneLoop
 from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, columns, lanes, truth
 from .plant import TICK
 from .sensors import NOISE, lost
@@ -125,7 +125,7 @@ def closed_loop(
     commanded = np.arange(0, count, _KEEP_ALIVE)
     for run in range(width):
         own = {what: values[:, run] for what, values in noise.items()}
-        closed = Loop(given.only(run), own, config, STRIDE)
+        closed = LaneLoop(given.only(run), own, config, STRIDE)
         closed.lose(gone[:, run], gone[:, run] & loop.whole)
         closed.command(commanded, [{"dither_rms": loop.dither}] * len(commanded))
         for last in range(TICK, count + TICK, TICK):

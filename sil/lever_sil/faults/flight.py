@@ -11,7 +11,7 @@ from lever_cdkf.firmware.config import Config
 from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
-from ..batch.closed_loop import Loop
+from ..batch.closed_loop import LaneLoop
 from ..batch.motions import PERIOD, Motion, columns, lanes, stream, truth
 from ..batch.plant import Lanes, grip_force
 from ..batch.sensors import GRIP_BIAS, GRIP_NOISE, NOISE
@@ -89,8 +89,8 @@ class Pilot:
         random = stream("faults", self.seed)
         return Bus(self.count, PERIOD, grip, DITHER, random), Readings.right(self.count, PERIOD, random)
 
-    def _closed(self, force: FloatArray | None, config: Config, sent: Bus, read: Readings) -> Loop:
-        flight = Loop(self.lanes, self.noise, config, health_stride=1)
+    def _closed(self, force: FloatArray | None, config: Config, sent: Bus, read: Readings) -> LaneLoop:
+        flight = LaneLoop(self.lanes, self.noise, config, health_stride=1)
         if force is not None:
             flight.add_sensor("grip_force", force, GRIP_BIAS + self.noise["grip_force"])
         struct, loop = flight.struct, flight.struct.pointer
