@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 from lever_cdkf.firmware.config import Config, settings_table
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator, feed
-from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.batch import firmware, motions, pilots, plant
 from lever_sil.batch.firmware import RESPONSE_STRIDE, Feedthrough, Track
 from lever_sil.batch.motions import Motion, Recording
@@ -83,29 +82,7 @@ def test_a_lever_that_nobody_holds_swings_on_its_own_spring() -> None:
     np.testing.assert_allclose(energy[-1], energy[2001], rtol=1e-6)
 
 
-def test_linear_pilots_move_as_the_plant_does(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the ordinary arm in place of theirs; periodic signals, so the second of two periods counts."""
-
-    def ordinary(c_p: FloatArray, k_p: FloatArray, frequency: FloatArray) -> ComplexArray:
-        stiffness: ComplexArray = k_p + 2j * np.pi * frequency * c_p
-        return stiffness
-
-    monkeypatch.setitem(pilots.LINEAR, "ordinary", ordinary)
-    motion = replace(QUIET, base=0.05, dither=0.05, pilot="ordinary")
-    recording = pilots.record(motion, SEEDS)
-    given = motions.lanes(motion, SEEDS)
-    z_ddot, tau_m, kick = (np.tile(column, (2, 1)) for column in (given.z_ddot, given.tau_m, given.kick))
-    theta, _ = plant.run(replace(given, z_ddot=z_ddot, tau_m=tau_m, kick=kick))
-    np.testing.assert_allclose(theta[len(recording.theta) :], recording.theta, atol=2e-5)
-    truth = sil_plant.LeverTruth(
-        lever(), sil_plant.Truth(given.m_p[0], given.c_p[0], given.k_p[0], given.trim[0]), "trim"
-    )
-    response = truth.transfer(np.arange(3)).response(motions.FREQUENCIES)
-    assert recording.response is not None
-    np.testing.assert_allclose(recording.response, response, rtol=1e-9)
-
-
-@pytest.mark.parametrize("pilot", ["two_dof", "mayo_ectomorphic"])
+@pytest.mark.parametrize("pilot", ["two_dof", "mayo_ectomorphic", "hysteretic", "reflex"])
 def test_pilots_of_sil_answer_the_base_as_their_response_says(pilot: str) -> None:
     recording = pilots.record(Motion(duration=20.0, dither=0.0, process_noise=0.0, pilot=pilot), range(1))
     spectrum = [np.fft.rfft(column[:-1, 0] * np.hanning(20000)) for column in (recording.theta, recording.z_ddot)]
@@ -206,22 +183,6 @@ def test_what_disturbs_the_lever_is_as_asked() -> None:
     power = np.abs(np.fft.rfft(added[:-1], axis=0)) ** 2
     assert np.all(power[17 * 20] > 0.999999 * power.sum(axis=0))
     np.testing.assert_allclose(np.std(added, axis=0), 2.0 / math.sqrt(2.0), rtol=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("pilot", "stiffness"),
-    [
-        ("hysteretic", lambda c_p, k_p, s: k_p * (1.0 + 0.6j) + 0.0 * s),
-        ("reflex", lambda c_p, k_p, s: k_p * (1.0 + 0.25 * np.exp(-0.035 * s)) + c_p * s),
-    ],
-)
-def test_linear_pilots_have_the_stiffness_that_they_are_known_for(
-    pilot: str, stiffness: Callable[[FloatArray, FloatArray, ComplexArray], ComplexArray]
-) -> None:
-    frequency = np.array((2.0, 4.0, 8.0))
-    c_p, k_p = np.array(((42.0,), (30.0,))), np.array(((1500.0,), (900.0,)))
-    expected = stiffness(c_p, k_p, 2j * np.pi * frequency)
-    np.testing.assert_allclose(pilots.LINEAR[pilot](c_p, k_p, frequency), expected)
 
 
 # --- sensors ---------------------------------------------------------------------------------------------------------
