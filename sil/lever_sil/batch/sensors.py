@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -20,8 +19,6 @@ GRIP_NOISE, GRIP_BIAS = 0.3, 2.0
 """Of the force sensor [N]."""
 CLOCK = "clock_rate"
 """As a signal with faults: how fast the sender's clock runs [1]."""
-INVALID = math.nan
-"""As a reading: it is marked invalid."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +78,7 @@ def measured(recording: Recording, given: Sensors, seeds: Sequence[int]) -> dict
     if given.lever_lost:
         gone = lost(seeds, len(recording.time), given.lever_lost)
         for what in ("theta", "theta_dot", "tau_m"):
-            signals[what][gone] = np.nan
+            signals[what][gone] = sensors.INVALID
     return signals
 
 

@@ -10,8 +10,8 @@ from dataclasses import replace
 from ..acceptance.result import Limit
 from ..batch.firmware import ClosedLoop
 from ..batch.motions import EVENT, Motion
-from ..batch.sensors import INVALID, Sensors
-from ..plants.sensors import Fault, Reads, Scale, Spikes, Stuck
+from ..batch.sensors import Sensors
+from ..plants.sensors import INVALID, Fault, Reads, Scale, Spikes, Stuck
 from .condition import Condition
 
 _PARAMETERS = ("m_p", "c_p", "k_p")

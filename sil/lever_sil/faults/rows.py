@@ -15,7 +15,7 @@ from lever_cdkf.can import codec
 
 from ..batch.motions import PERIOD, Motion
 from ..plants import sensors
-from ..plants.sensors import Offset, Reads, Scale, Spikes, Stuck
+from ..plants.sensors import INVALID, Offset, Reads, Scale, Spikes, Stuck
 from . import bus, readings
 from .bus import Interval
 from .judge import Requirement
@@ -282,7 +282,7 @@ def _readings() -> Iterator[Row]:
         greatest, offset = readings.GREATEST[signal], readings.STEP[signal]
         spikes = Spikes(share=0.01, size=readings.SPIKE[signal])
         faults: dict[str, tuple[str, sensors.Fault, Requirement]] = {
-            "invalid": ("marked invalid", Reads(value=math.nan), gone),
+            "invalid": ("marked invalid", Reads(value=INVALID), gone),
             "not_available": ("NaN-coded but marked valid", Reads(value=math.inf), gone),
             "saturated": ("saturated", Reads(value=greatest), still if grip else gone),
             "stuck": ("stuck", Stuck(), still),
@@ -305,7 +305,7 @@ def _readings() -> Iterator[Row]:
                 grip=grip,
                 quick=quick,
             )
-    neither = wrong(Reads(value=math.nan), "theta", "theta_dot")
+    neither = wrong(Reads(value=INVALID), "theta", "theta_dot")
     yield Row("outputs_invalid", "θ and θ̇ marked invalid", _BLIND, on_readings=neither)
 
 

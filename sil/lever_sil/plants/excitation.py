@@ -18,22 +18,12 @@ import numpy as np
 from lever_cdkf.numeric.arrays import FloatArray
 
 from ..toml_tables import SIGNAL, quantity, read_kind, whole, wholes
+from .window import Window
 
 
 @dataclass(frozen=True, kw_only=True)
-class Excitation(ABC):
-    """Something that acts from `start` (included) to `end` (excluded) [s]."""
-
-    start: float = quantity("s", 0.0, least=0.0)
-    end: float = quantity("s", math.inf, above=0.0)
-
-    def __post_init__(self) -> None:
-        if not self.start < self.end:
-            raise ValueError(f"start {self.start:g} s is not before end {self.end:g} s")
-        self.check()
-
-    def check(self) -> None:  # noqa: B027 (most kinds have nothing to check)
-        """Raise ValueError when fields contradict each other."""
+class Excitation(Window, ABC):
+    """Something that acts in its window."""
 
     def samples(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return the signal at the evenly spaced times `time` [s]."""
@@ -84,8 +74,8 @@ class Band(Normalised):
     low: float = quantity("Hz", above=0.0)
     high: float = quantity("Hz", above=0.0)
 
-    def check(self) -> None:
-        """Raise ValueError unless `low` is below `high`."""
+    def __post_init__(self) -> None:
+        super().__post_init__()
         if not self.low < self.high:
             raise ValueError(f"low {self.low:g} Hz is not below high {self.high:g} Hz")
 
@@ -180,8 +170,8 @@ class Pulses(Excitation):
     width: float = quantity("s", above=0.0)
     period: float = quantity("s", above=0.0)
 
-    def check(self) -> None:
-        """Raise ValueError when a pulse is longer than the period."""
+    def __post_init__(self) -> None:
+        super().__post_init__()
         if self.width > self.period:
             raise ValueError(f"width {self.width:g} s is longer than period {self.period:g} s")
 

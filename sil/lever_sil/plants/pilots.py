@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from lever_cdkf.numeric.arrays import FloatArray
+from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 
 from ..toml_tables import choice, item, quantity, read_kind, read_table, tables
 from . import hysteretic_plant, lever_plant, linear_plant, mayo_plant, reflex_plant, two_dof_plant
 from .trajectories import Constant, Trajectory, read_trajectory
 from .truth import Truth
+from .window import Window
 
 _SIDES = {1: "falls to {least:g}; it must stay above 0", -1: "rises to {greatest:g}; it must stay below 0"}
 
@@ -85,16 +86,17 @@ class ArmPilot(Pilot):
     k_p: Trajectory = item(read_trajectory(), "N/m")
 
 
-@dataclass(frozen=True)
-class HandsOff:
-    """The lever is let go of from start (included) to end (excluded)."""
+@dataclass(frozen=True, kw_only=True)
+class HandsOff(Window):
+    """Nobody holds the lever."""
 
     start: float = quantity("s", above=0.0)
-    end: float = quantity("s", math.inf, above=0.0)
 
-    def __post_init__(self) -> None:
-        if not self.start < self.end:
-            raise ValueError(f"start {self.start:g} s is not before end {self.end:g} s")
+
+def is_held(hands_off: Sequence[HandsOff], time: FloatArray) -> BoolArray:
+    """Return whether somebody holds the lever at each of the times `time` [s]; `hands_off` has at least one item."""
+    held: BoolArray = np.all([~off.contains(time) for off in hands_off], axis=0)
+    return held
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,9 +122,7 @@ class LeverPilot(ArmPilot):
         """Where he lets go, the lever's spring keeps its place until he takes it again."""
         if not self.hands_off:
             return lever_plant.LeverTruth(lever, lever_plant.Truth(**values, trim=trim), self.preload)
-        held = np.ones(len(time), dtype=np.bool_)
-        for off in self.hands_off:
-            held &= (time < off.start) | (time >= off.end)
+        held = is_held(self.hands_off, time)
         last_held = np.maximum.accumulate(np.where(held, np.arange(len(time)), 0))
         arm = {name: np.where(held, column, 0.0) for name, column in values.items()}
         return lever_plant.LeverTruth(lever, lever_plant.Truth(**arm, trim=trim[last_held]), self.preload)

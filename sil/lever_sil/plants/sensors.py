@@ -17,9 +17,12 @@ from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from numpy.typing import NDArray
 
 from ..toml_tables import SIGNAL, choice, item, quantity, read_kind, read_table, tables
+from .window import Window
 
 VALUES = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
 FRAMES = ("lever_frame", "base_frame")
+INVALID = math.nan
+"""The reading of a sensor that marks it as invalid."""
 
 
 @dataclass(frozen=True)
@@ -43,15 +46,8 @@ class Corruption:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fault(ABC):
+class Fault(Window, ABC):
     """What is wrong with a sensor from start (included) to end (excluded), without its being marked invalid."""
-
-    start: float = quantity("s", 0.0, least=0.0)
-    end: float = quantity("s", math.inf, above=0.0)
-
-    def __post_init__(self) -> None:
-        if not self.start < self.end:
-            raise ValueError(f"start {self.start:g} s is not before end {self.end:g} s")
 
     @abstractmethod
     def corrupt(self, inside: NDArray[np.intp], corruption: Corruption, rng: np.random.Generator) -> None:
@@ -180,25 +176,23 @@ class Sensor:
         """Return what its faults do at the times `time` [s], a `period` apart."""
         corruption = Corruption.none(len(time), period)
         for fault in self.fault:
-            inside = np.flatnonzero((time >= fault.start) & (time < fault.end))
+            inside = np.flatnonzero(fault.contains(time))
             if len(inside):
                 fault.corrupt(inside, corruption, rng)
         return corruption
 
 
 @dataclass(frozen=True)
-class Dropout:
-    """Something missing for `share` of the time between start and end, in bursts of `burst` on average."""
+class Dropout(Window):
+    """Something missing for `share` of the time in its window, in bursts of `burst` on average."""
 
     what: str = choice(*VALUES, *FRAMES)
     share: float = quantity("1", above=0.0, greatest=1.0)
     burst: float = quantity("s", 1e-3, above=0.0)
-    start: float = quantity("s", 0.0, least=0.0)
-    end: float = quantity("s", math.inf, above=0.0)
 
     def missing(self, time: FloatArray, period: float, rng: np.random.Generator) -> BoolArray:
         """Return True at the samples `time` [s] that are missing: Gilbert's two states, geometric bursts and pauses."""
-        inside = (time >= self.start) & (time < self.end)
+        inside = self.contains(time)
         if self.share == 1.0:
             return inside
         burst = max(1.0, self.burst / period)

@@ -44,7 +44,7 @@ class Inputs:
     @property
     def base(self) -> FloatArray:
         """z_ddot_measured; NaN where it is marked invalid."""
-        return np.where(self.missing["z_ddot"], np.nan, self.z_ddot_measured)
+        return np.where(self.missing["z_ddot"], sensors.INVALID, self.z_ddot_measured)
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def readings(scenario: Scenario, inputs: Inputs, name: str) -> Readings:
     corruption, missing = None, inputs.missing[name]
     if sensor.fault or missing.any():
         corruption = scenario.corruption(name, inputs.time)
-        corruption.offset[missing] = np.nan
+        corruption.offset[missing] = sensors.INVALID
     return Readings(sensor, sensor.offsets(len(inputs.time), scenario.stream(name)), corruption)
 
 

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from lever_sil.acceptance.result import Limit
 from lever_sil.batch.motions import Motion
-from lever_sil.batch.sensors import INVALID, Sensors
+from lever_sil.batch.sensors import Sensors
 from lever_sil.envelope.condition import Condition
 from lever_sil.envelope.conditions import CONDITIONS
 from lever_sil.envelope.measure import FIGURES
 from lever_sil.envelope.rules import RULES
-from lever_sil.plants.sensors import Late, Reads, Scale, Spikes, Stuck
+from lever_sil.plants.sensors import INVALID, Late, Reads, Scale, Spikes, Stuck
 
 ALL = CONDITIONS | RULES
 COVERED = ", ".join(f"{name} covered ≥ 90" for name in ("f_n", "zeta", "m_p", "c_p", "k_p"))

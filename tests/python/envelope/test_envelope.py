@@ -14,11 +14,11 @@ from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.batch import firmware, motions, pilots, plant
 from lever_sil.batch.firmware import RESPONSE_STRIDE, Feedthrough, Track
 from lever_sil.batch.motions import Motion, Recording
-from lever_sil.batch.sensors import CLOCK, INVALID, NOISE, Sensors, lost, measured
+from lever_sil.batch.sensors import CLOCK, NOISE, Sensors, lost, measured
 from lever_sil.envelope import measure
 from lever_sil.envelope.measure import FIGURES, Outcome, fault_mask
 from lever_sil.plants import lever_plant as sil_plant
-from lever_sil.plants.sensors import Reads, Scale, Spikes, Stuck
+from lever_sil.plants.sensors import INVALID, Reads, Scale, Spikes, Stuck
 from lever_sil.plants.truth import Conditions
 from numpy.typing import NDArray
 

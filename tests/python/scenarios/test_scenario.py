@@ -191,6 +191,10 @@ def test_overrides_replace_values_with_or_without_quotes(load: Load) -> None:
         ),
         (LEAST + "[[torque]]\nkind = 'sine'\nrms = '1 g'\nfrequency = '1 Hz'", r"torque\[0\].rms: '1 g' has unit 'g'"),
         (LEAST + "[[sensors.dropout]]\nwhat = 'all'\nshare = '1 %'", r"sensors.dropout\[0\].what: 'all' is not known"),
+        (
+            LEAST + "[[sensors.dropout]]\nwhat = 'theta'\nshare = '1 %'\nstart = '2 s'\nend = '1 s'",
+            r"sensors.dropout\[0\]: start 2 s is not before end 1 s",
+        ),
         (LEAST + "[sensors]\ntheta = { noise = '1 m' }", "sensors.theta.noise: '1 m' has unit 'm'; allowed: rad, mrad"),
         (LEAST + "[base]\nkind = 'sine'", "base: must be a list"),
         ("title =", "made.toml: not TOML"),

@@ -12,11 +12,11 @@ import pytest
 from lever_cdkf.cli.main import main
 from lever_sil.batch.firmware import ClosedLoop
 from lever_sil.batch.motions import FREQUENCIES, PERIOD, Motion
-from lever_sil.batch.sensors import INVALID, Sensors
+from lever_sil.batch.sensors import Sensors
 from lever_sil.envelope import conditions
 from lever_sil.envelope.condition import Condition
 from lever_sil.envelope.measure import FIGURES, Outcome
-from lever_sil.plants.sensors import Reads
+from lever_sil.plants.sensors import INVALID, Reads
 from lever_sil.study.baselines.joint_ekf import Joint
 from lever_sil.study.compare_envelope import filters, logs, run_estimators, tables
 from lever_sil.study.compare_envelope.run_estimators import ESTIMATORS, EstimatorResult

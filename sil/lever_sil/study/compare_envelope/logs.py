@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
 from lever_cdkf.errors import SettingsError
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.numeric.arrays import Array
@@ -16,6 +15,7 @@ from ...batch.firmware import ClosedLoop
 from ...batch.motions import Motion, Recording, arms, lanes, truth
 from ...batch.sensors import Sensors, lost, measured
 from ...envelope.condition import Condition
+from ...plants.sensors import INVALID
 
 LANES = 64
 """Runs filtered at a time: more would save little time and cost memory."""
@@ -105,5 +105,5 @@ def _closed_loop(condition: Condition, loop: ClosedLoop, seeds: Sequence[int], t
     signals = measured(recording, Sensors(), seeds)
     gone = lost(seeds, len(recording.time), loop.lost, loop.lost_for)
     for name in signals if loop.whole else ("theta", "theta_dot", "tau_m"):
-        signals[name][gone] = np.nan
+        signals[name][gone] = INVALID
     return Log(condition, recording, signals, trim, track)
