@@ -25,11 +25,11 @@ MOTOR_LAG = 2e-3
 class LaneLoop:
     """One run of a lever, its sensors and the firmware."""
 
-    def __init__(self, given: Lanes, noise: Mapping[str, FloatArray], config: Config, health_stride: int) -> None:
+    def __init__(self, given: Lanes, offsets: Mapping[str, FloatArray], config: Config, health_stride: int) -> None:
         """Prepare it.
 
-        `given` has one lane; `noise` a value a sample of theta, theta_dot, tau_m and z_ddot. Health is kept of every
-        `health_stride`-th sample.
+        `given` has one lane; `offsets` are added to theta, theta_dot, tau_m and z_ddot, a value a sample. Health is
+        kept of every `health_stride`-th sample.
         """
         self._estimator, self._plant = Estimator(config), BatchPlant(given)
         self.count = self._plant.count
@@ -49,17 +49,17 @@ class LaneLoop:
         loop.lanes, loop.motor_decay = self._plant.struct.pointer, math.exp(-PERIOD / MOTOR_LAG)
         loop.stride, loop.health_stride = STRIDE, health_stride
         for name, values in self.signals.items():
-            self.add_sensor(name, values, noise[name])
+            self.add_sensor(name, values, offsets[name])
         self.lose(np.zeros(self.count), np.zeros(self.count))
         loop.estimate = self.struct.array("struct lever_estimate", self.estimate, self.estimate.dtype)
         loop.health = self.struct.array("struct lever_health", self.health, self.health.dtype)
         loop.asked_of_motor = self.struct.doubles(self.asked)
 
-    def add_sensor(self, name: str, true: FloatArray, noise: FloatArray) -> None:
+    def add_sensor(self, name: str, true: FloatArray, offsets: FloatArray) -> None:
         """Have a sensor of a signal."""
         index = getattr(lib, f"LOOP_{name.upper()}")
         sensor = self.struct.pointer.sensor[index]
-        sensor.gain, sensor.offset, sensor.field = 1.0, self.struct.doubles(noise), field_of(name)
+        sensor.gain, sensor.offset, sensor.field = 1.0, self.struct.doubles(offsets), field_of(name)
         self.struct.pointer.signal[index] = self.struct.doubles(true)
 
     def lose(self, lever: NDArray[Any], base: NDArray[Any]) -> None:

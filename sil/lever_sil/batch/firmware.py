@@ -16,9 +16,9 @@ from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from .closed_loop import LaneLoop
-from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, columns, lanes, truth
+from .motions import FREQUENCIES, PERIOD, STRIDE, Motion, Recording, lanes, truth
 from .plant import TICK
-from .sensors import NOISE, lost
+from .sensors import lost, offsets
 
 PARAMETERS = ("m_p", "c_p", "k_p")
 RESPONSE_STRIDE = 50
@@ -120,12 +120,10 @@ def closed_loop(
     """
     given = lanes(motion, seeds)
     count, width = given.z_ddot.shape
-    noise = {what: sigma * columns(f"noise of {what}", seeds, count) for what, sigma in NOISE.items()}
     gone, notes, runs = lost(seeds, count, loop.lost, loop.lost_for), _Notes(count, width), []
     commanded = np.arange(0, count, _KEEP_ALIVE)
-    for run in range(width):
-        own = {what: values[:, run] for what, values in noise.items()}
-        closed = LaneLoop(given.only(run), own, config, STRIDE)
+    for run, seed in enumerate(seeds):
+        closed = LaneLoop(given.only(run), offsets(seed, count), config, STRIDE)
         closed.lose(gone[:, run], gone[:, run] & loop.whole)
         closed.command(commanded, [{"dither_rms": loop.dither}] * len(commanded))
         for last in range(TICK, count + TICK, TICK):

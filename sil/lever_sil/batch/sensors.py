@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
@@ -11,12 +11,11 @@ from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from ..plants import sensors
 from .motions import PERIOD, Recording, columns, stream
 
-NOISE: Mapping[str, float] = {
-    name: getattr(sensors.Sensors(), name).noise for name in ("theta", "theta_dot", "tau_m", "z_ddot")
+SENSORS: Mapping[str, sensors.Sensor] = {
+    **{name: getattr(sensors.Sensors(), name) for name in ("theta", "theta_dot", "tau_m", "z_ddot")},
+    "grip_force": sensors.Sensor(noise=0.3, bias=2.0),
 }
-"""Standard deviation of a sample [rad, rad/s, N m, m/s^2]."""
-GRIP_NOISE, GRIP_BIAS = 0.3, 2.0
-"""Of the force sensor [N]."""
+"""Those that scenarios have by default, and one of the grip force."""
 CLOCK = "clock_rate"
 """As a signal with faults: how fast the sender's clock runs [1]."""
 
@@ -42,7 +41,12 @@ class Sensors:
     lever_lost: float = 0.0
     """Share of the LEVER_SAMPLEs that never arrive, at random: theta, theta_dot and tau_m are not valid then."""
     faults: tuple[tuple[str, sensors.Fault], ...] = ()
-    """Each of a signal: a key of NOISE, or CLOCK."""
+    """Each of a signal: a key of SENSORS, or CLOCK."""
+
+
+def offsets(seed: int, count: int) -> dict[str, FloatArray]:
+    """Return bias and noise of all sensors in one run, a value a sample."""
+    return {what: sensor.offsets(count, stream(f"noise of {what}", seed)) for what, sensor in SENSORS.items()}
 
 
 def measured(recording: Recording, given: Sensors, seeds: Sequence[int]) -> dict[str, FloatArray]:
@@ -52,29 +56,26 @@ def measured(recording: Recording, given: Sensors, seeds: Sequence[int]) -> dict
         values: FloatArray = mean + sigma * columns(what, seeds, 1)[0]
         return values
 
-    gain = {
-        "theta": np.full(len(seeds), given.angle_gain),
-        "theta_dot": np.full(len(seeds), given.angle_gain),
-        "tau_m": drawn(given.tau_m_gain, given.tau_m_gain_sigma, "torque gain"),
-        "z_ddot": drawn(given.z_ddot_gain, given.z_ddot_gain_sigma, "base gain"),
-    }
-    delay = drawn(given.z_ddot_delay, given.z_ddot_delay_sigma, "base delay")
-    signals = {}
-    for what, noise in NOISE.items():
-        true: FloatArray = getattr(recording, what)
-        late = _delayed(true, delay) if what == "z_ddot" and delay.any() else true
-        signals[what] = gain[what] * late + noise * columns(f"noise of {what}", seeds, len(true))
+    angle = np.full(len(seeds), given.angle_gain)
+    torque = drawn(given.tau_m_gain, given.tau_m_gain_sigma, "torque gain")
+    base = drawn(given.z_ddot_gain, given.z_ddot_gain_sigma, "base gain")
+    gain = {"theta": angle, "theta_dot": angle, "tau_m": torque, "z_ddot": base}
+    true: dict[str, FloatArray] = {what: getattr(recording, what) for what in gain}
     if given.grip_gain is not None and recording.grip_force is not None:
-        errors = GRIP_BIAS + GRIP_NOISE * columns("noise of grip_force", seeds, len(recording.time))
-        gains = drawn(given.grip_gain, given.grip_gain_sigma, "grip gain")
-        signals["grip_force"] = gains * recording.grip_force + errors
+        gain["grip_force"] = drawn(given.grip_gain, given.grip_gain_sigma, "grip gain")
+        true["grip_force"] = recording.grip_force
     if any(what == CLOCK for what, _ in given.faults):
-        signals[CLOCK] = np.ones_like(recording.theta)
-    for what in dict.fromkeys(what for what, _ in given.faults):
-        sensor = sensors.Sensor(fault=tuple(fault for signal, fault in given.faults if signal == what))
+        gain[CLOCK], true[CLOCK] = np.ones(len(seeds)), np.ones_like(recording.theta)
+    delay = drawn(given.z_ddot_delay, given.z_ddot_delay_sigma, "base delay")
+    signals = {what: np.empty_like(values) for what, values in true.items()}
+    for what, values in true.items():
+        usual = SENSORS.get(what, sensors.Sensor())
+        faults = tuple(fault for signal, fault in given.faults if signal == what)
         for run, seed in enumerate(seeds):
-            corruption = sensor.corruption(recording.time, PERIOD, stream("spikes", seed))
-            signals[what][:, run] = corruption.of(signals[what][:, run])
+            late = delay[run] if what == "z_ddot" else 0.0
+            sensor = replace(usual, gain_error=gain[what][run] - 1.0, delay=late, fault=faults)
+            readings = sensor.measure(values[:, run], PERIOD, stream(f"noise of {what}", seed))
+            signals[what][:, run] = sensor.corruption(recording.time, PERIOD, stream("spikes", seed)).of(readings)
     if given.lever_lost:
         gone = lost(seeds, len(recording.time), given.lever_lost)
         for what in ("theta", "theta_dot", "tau_m"):
@@ -87,11 +88,3 @@ def lost(seeds: Sequence[int], count: int, share: float, length: float = PERIOD)
     each = round(length / PERIOD)
     hit = np.stack([stream("lost", seed).random(-(-count // each)) < share for seed in seeds], axis=1)
     return np.repeat(hit, each, axis=0)[:count]
-
-
-def _delayed(signal: FloatArray, delay: FloatArray) -> FloatArray:
-    """Return each column so much later [s], by interpolation; before its start it had its first value."""
-    at = np.arange(len(signal), dtype=np.float64)
-    return np.stack(
-        [np.interp(at - late / PERIOD, at, column) for late, column in zip(delay, signal.T, strict=True)], axis=1
-    )

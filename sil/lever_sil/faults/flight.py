@@ -12,9 +12,9 @@ from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from ..batch.closed_loop import LaneLoop
-from ..batch.motions import PERIOD, Motion, columns, lanes, stream, truth
+from ..batch.motions import PERIOD, Motion, lanes, stream, truth
 from ..batch.plant import Lanes, grip_force
-from ..batch.sensors import GRIP_BIAS, GRIP_NOISE, NOISE
+from ..batch.sensors import offsets
 from ..fast.library import lib
 from . import bus, readings
 from .bus import Bus, Interval
@@ -24,7 +24,6 @@ DITHER = 0.3
 """rms that COMMANDs ask for [N m]."""
 FREEZE = 12.0
 """From here on the parameters are held in flights that are frozen [s]."""
-_NOISE = {**NOISE, "grip_force": GRIP_NOISE}
 
 
 @dataclass(frozen=True)
@@ -50,9 +49,7 @@ class Pilot:
         self.seed = seed
         self.lanes: Lanes = lanes(motion, [seed])
         self.count = len(motion.time)
-        self.noise = {
-            name: sigma * columns(f"noise of {name}", [seed], self.count)[:, 0] for name, sigma in _NOISE.items()
-        }
+        self.offsets = offsets(seed, self.count)
         self.truth = {name: values[:, 0] for name, values in truth(self.lanes).items()}
 
     @cached_property
@@ -90,9 +87,9 @@ class Pilot:
         return Bus(self.count, PERIOD, grip, DITHER, random), Readings.right(self.count, PERIOD, random)
 
     def _closed(self, force: FloatArray | None, config: Config, sent: Bus, read: Readings) -> LaneLoop:
-        flight = LaneLoop(self.lanes, self.noise, config, health_stride=1)
+        flight = LaneLoop(self.lanes, self.offsets, config, health_stride=1)
         if force is not None:
-            flight.add_sensor("grip_force", force, GRIP_BIAS + self.noise["grip_force"])
+            flight.add_sensor("grip_force", force, self.offsets["grip_force"])
         struct, loop = flight.struct, flight.struct.pointer
         for name, reading in read.of.items():
             sensor = loop.sensor[getattr(lib, f"LOOP_{name.upper()}")]

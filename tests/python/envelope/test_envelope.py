@@ -14,7 +14,7 @@ from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.batch import firmware, motions, pilots, plant
 from lever_sil.batch.firmware import RESPONSE_STRIDE, Feedthrough, Track
 from lever_sil.batch.motions import Motion, Recording
-from lever_sil.batch.sensors import CLOCK, NOISE, Sensors, lost, measured
+from lever_sil.batch.sensors import CLOCK, SENSORS, Sensors, lost, measured
 from lever_sil.envelope import measure
 from lever_sil.envelope.measure import FIGURES, Outcome, fault_mask
 from lever_sil.plants import lever_plant as sil_plant
@@ -203,7 +203,7 @@ def test_gain_and_delay() -> None:
         np.testing.assert_allclose(
             (off[name] - clean[name])[10:], (gain * (ramps().theta - late) - ramps().theta)[10:], atol=1e-12
         )
-        assert np.std(clean[name] - ramps().theta) == pytest.approx(NOISE[name], rel=0.05)
+        assert np.std(clean[name] - ramps().theta) == pytest.approx(SENSORS[name].noise, rel=0.05)
 
 
 def test_the_sensor_of_the_grip_force_has_gain_bias_and_noise() -> None:

@@ -20,7 +20,7 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from ...batch.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from ...batch.motions import FREQUENCIES, PERIOD, STRIDE
-from ...batch.sensors import NOISE
+from ...batch.sensors import SENSORS
 from ..baselines.joint_ekf import Joint, JointEkf
 from ..baselines.joint_ukf import JointUkf
 from ..baselines.recursion import follow
@@ -80,8 +80,8 @@ def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
         trim = low_pass(signals[..., :1], settings["trim_corner"], start[:, :1])[..., 0]
         signals = high_pass(signals, settings["trim_corner"], start)
     with_noise = settings | {
-        "theta_noise": NOISE["theta"],
-        "theta_dot_noise": NOISE["theta_dot"],
+        "theta_noise": SENSORS["theta"].noise,
+        "theta_dot_noise": SENSORS["theta_dot"].noise,
         "theta_dot_process_noise": logs[0].condition.motion.process_noise,
     }
     y, u, trim, missing = (part.swapaxes(0, 1) for part in (signals[..., :2], signals[..., 2:], trim, missing))
