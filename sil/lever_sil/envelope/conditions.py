@@ -5,13 +5,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from ..acceptance.result import Limit
 from ..batch.firmware import ClosedLoop
-from ..batch.motions import EVENT, Motion
+from ..batch.motions import BASE, DITHER, EVENT, Excitations, Motion, noise
 from ..batch.sensors import Sensors
+from ..plants.excitation import GaussMarkov
+from ..plants.pilots import HandsOff
 from ..plants.sensors import INVALID, Fault, Reads, Scale, Spikes, Stuck
+from ..plants.trajectories import Noise, Ramp, Sinusoid, Steps
 from .condition import Condition
 
 _PARAMETERS = ("m_p", "c_p", "k_p")
@@ -41,7 +45,7 @@ _FLAGGED = (least("flagged", 90.0),)
 QUIET = most("flagged", 2.0)
 _ALL_COVERED = tuple(least(f"{name} covered", 90.0) for name in ("f_n", "zeta", *_PARAMETERS))
 _OF_PARAMETERS = tuple(f"{name} {what}" for name in _PARAMETERS for what in ("rms", "covered"))
-NO_DITHER = Motion(dither=0.0)
+NO_DITHER = Motion(torque=())
 FAILING = {"start": EVENT, "end": EVENT + 10.0}
 """When a sensor is wrong [s]."""
 
@@ -50,32 +54,58 @@ _STEADY = (
     Condition("steady_base_only", "steady flight, no dither", NO_DITHER, (*right(2.0), QUIET), also=_OF_PARAMETERS),
 )
 
+
+def sway(degrees: float, frequency: float) -> Sinusoid:
+    """Return how a pilot moves the lever as a sine of this amplitude and frequency [Hz], from any phase."""
+    return Sinusoid(0.0, math.radians(degrees), frequency, phase=None)
+
+
+def _wander(degrees: float) -> Noise:
+    """Return how a pilot moves the lever at random, of this rms."""
+    return Noise(mean=0.0, rms=math.radians(degrees), low=0.05, high=0.5)
+
+
+def _move(degrees: float, seconds: float) -> Ramp:
+    """Return how a pilot moves the lever once."""
+    return Ramp(0.0, math.radians(degrees), EVENT, seconds)
+
+
+def _grip(factor: float, degrees: float, seconds: float) -> Motion:
+    """Return a pilot who tightens his grip, or eases it, which moves the lever."""
+    arm = Ramp(1.0, factor, EVENT, seconds)
+    return Motion(c_p=arm, k_p=arm, either_way=True, trim=_move(degrees, seconds))
+
+
 _MOVEMENT = (
-    Condition("sway_2deg_0.3hz", "the pilot moves the lever, ±2° at 0.3 Hz", Motion(sway=(2.0, 0.3)), right(2.0)),
+    Condition("sway_2deg_0.3hz", "the pilot moves the lever, ±2° at 0.3 Hz", Motion(trim=sway(2.0, 0.3)), right(2.0)),
     Condition(
-        "sway_5deg_0.3hz", "the pilot moves the lever, ±5° at 0.3 Hz", Motion(sway=(5.0, 0.3)), right(3.0), quick=True
+        "sway_5deg_0.3hz",
+        "the pilot moves the lever, ±5° at 0.3 Hz",
+        Motion(trim=sway(5.0, 0.3)),
+        right(3.0),
+        quick=True,
     ),
-    Condition("sway_1deg_0.5hz", "the pilot moves the lever, ±1° at 0.5 Hz", Motion(sway=(1.0, 0.5)), right(2.0)),
-    Condition("wander_1deg", "random movement, 0.05–0.5 Hz, 1° rms", Motion(wander=1.0), right(1.5)),
+    Condition("sway_1deg_0.5hz", "the pilot moves the lever, ±1° at 0.5 Hz", Motion(trim=sway(1.0, 0.5)), right(2.0)),
+    Condition("wander_1deg", "random movement, 0.05–0.5 Hz, 1° rms", Motion(trim=_wander(1.0)), right(1.5)),
     Condition(
-        "wander_1deg_base_only", "random movement, 1° rms, no dither", replace(NO_DITHER, wander=1.0), right(1.5)
+        "wander_1deg_base_only", "random movement, 1° rms, no dither", Motion(torque=(), trim=_wander(1.0)), right(1.5)
     ),
-    Condition("wander_3deg", "random movement, 0.05–0.5 Hz, 3° rms", Motion(wander=3.0), right(3.0)),
+    Condition("wander_3deg", "random movement, 0.05–0.5 Hz, 3° rms", Motion(trim=_wander(3.0)), right(3.0)),
     Condition(
-        "wander_3deg_base_only", "random movement, 3° rms, no dither", replace(NO_DITHER, wander=3.0), right(3.0)
+        "wander_3deg_base_only", "random movement, 3° rms, no dither", Motion(torque=(), trim=_wander(3.0)), right(3.0)
     ),
-    Condition("retrim", "re-trim by 8° in 4 s", Motion(retrim=8.0), (most("f_n rms", 1.2),), quick=True),
+    Condition("retrim", "re-trim by 8° in 4 s", Motion(trim=_move(8.0, 4.0)), (most("f_n rms", 1.2),), quick=True),
     Condition(
         "grip_step",
         "grip step of 30 % that moves the rest angle by 1° in 50 ms",
-        Motion(grip=1.3),
+        _grip(1.3, 1.0, 0.05),
         (most("settled", 0.9, "median"), most("settled", 2.0, "worst")),
         events=((EVENT, EVENT),),
     ),
     Condition(
         "grip_slow",
         "grip step of 50 % that moves the rest angle by 3° in 0.5 s",
-        Motion(grip=1.5, grip_moves=(3.0, 0.5)),
+        _grip(1.5, 3.0, 0.5),
         (most("settled", 2.0, "median"), least("f_n covered", 90.0)),
         events=((EVENT, EVENT + 0.5),),
         start=EVENT,
@@ -87,11 +117,13 @@ _TORQUES = (
     Condition(
         "slow_torque",
         "unknown torque, 1 N m rms, 0.3 s of correlation",
-        Motion(slow_torque=1.0),
+        Motion(disturbance=(GaussMarkov(rms=1.0, correlation_time=0.3),)),
         right(3.0, 85.0),
         _FLAGGED,
     ),
-    Condition("tremor", "tremor of 0.2 N m, 3–5 Hz", Motion(tremor=0.2), right(3.0, 85.0), _FLAGGED),
+    Condition(
+        "tremor", "tremor of 0.2 N m, 3–5 Hz", Motion(disturbance=noise(0.2, 3.0, 5.0)), right(3.0, 85.0), _FLAGGED
+    ),
     Condition("rough_told", "process noise 0.5, as set", _ROUGH, settings={"theta_dot_process_noise": 0.5}),
     Condition(
         "rough",
@@ -102,8 +134,8 @@ _TORQUES = (
     ),
     Condition(
         "damping_ramp",
-        "c_p from 42 to 18 N s/m as a ramp of 30 s",
-        Motion(damping=(42.0, 18.0, 20.0, 50.0)),
+        "c_p falls to 43 % as a ramp of 30 s",
+        Motion(c_p=Ramp(1.0, 0.43, 20.0, 30.0)),
         (least("c_p covered", 90.0), most("lag", 1.5)),
         start=22.0,
         end=50.0,
@@ -111,12 +143,17 @@ _TORQUES = (
     ),
 )
 
+
+def _at_rest(start: float, end: float, duration: float = 60.0) -> Motion:
+    """Return a motion that pauses: nothing acts on the lever from start to end [s]."""
+    base, torque = ((replace(each, end=start), replace(each, start=end)) for each in (*BASE, *DITHER))
+    return Motion(duration, base, torque, gusts=Steps(1.0, (start, end), (0.0, 1.0)))
+
+
 _INVALID = ((25.0, 25.2), (28.0, 29.0), (33.0, 36.0), (41.0, 51.0))
 _OUTAGES = (
-    Condition("rest_20s", "lever and base at rest for 20 s", Motion(pause=(20.0, 40.0)), _within(4.0), quick=True),
-    Condition(
-        "rest_120s", "lever and base at rest for 120 s", Motion(duration=160.0, pause=(20.0, 140.0)), _within(4.0)
-    ),
+    Condition("rest_20s", "lever and base at rest for 20 s", _at_rest(20.0, 40.0), _within(4.0), quick=True),
+    Condition("rest_120s", "lever and base at rest for 120 s", _at_rest(20.0, 140.0, 160.0), _within(4.0)),
     Condition(
         "base_invalid",
         "z̈ marked invalid for 0.2, 1, 3 and 10 s",
@@ -168,11 +205,11 @@ def _missing(name: str, title: str, what: str) -> Condition:
     return Condition(name, title, limits=(least("running", 99.0), *right(3.0, 85.0)), sensors=sensors)
 
 
-def _hands_off(name: str, title: str, dither: float) -> Condition:
+def _hands_off(name: str, title: str, torque: Excitations) -> Condition:
     return Condition(
         name,
         title,
-        Motion(dither=dither, released=(25.0, 35.0)),
+        Motion(torque=torque, hands_off=(HandsOff(start=25.0, end=35.0),)),
         (most("to HANDS_OFF", 1.0), most("settled", 2.0)),
         events=((25.0, 35.0),),
         start=40.0,
@@ -182,10 +219,11 @@ def _hands_off(name: str, title: str, dither: float) -> Condition:
 
 def _next_pilot(name: str, title: str, seconds: float) -> Condition:
     gap = (25.0, 25.0 + seconds)
+    arm = Steps(1.0, gap[1:], (2.0,))
     return Condition(
         name,
         title,
-        Motion(duration=40.0, released=gap, next_pilot=2.0),
+        Motion(40.0, hands_off=(HandsOff(start=gap[0], end=gap[1]),), c_p=arm, k_p=arm, either_way=True),
         (most("settled", 2.0, "median"), least("f_n covered", 90.0)),
         events=(gap,),
         start=gap[1],
@@ -208,8 +246,8 @@ _FAULTS = (
     ),
     _missing("only_theta", "only θ from the start", "theta_dot"),
     replace(_missing("only_rate", "only θ̇ from the start", "theta"), quick=True),
-    _hands_off("hands_off", "hands off for 10 s, then on", 0.3),
-    _hands_off("hands_off_base_only", "hands off for 10 s, then on, no dither", 0.0),
+    _hands_off("hands_off", "hands off for 10 s, then on", DITHER),
+    _hands_off("hands_off_base_only", "hands off for 10 s, then on, no dither", ()),
     _next_pilot("next_pilot_0.3s", "hands off for 0.3 s, then on by a pilot twice or half as stiff", 0.3),
     _next_pilot("next_pilot_2s", "hands off for 2 s, then on by a pilot twice or half as stiff", 2.0),
 )
@@ -235,7 +273,9 @@ def _slipping(friction: float) -> Condition:
     """
     title = f"friction of {friction:g} N m, through which the pilot moves the lever, 3° rms"
     also = ("unflagged", "silent")
-    return Condition(f"friction_{friction:g}", title, Motion(friction=friction, wander=3.0), also=also, start=2.0)
+    return Condition(
+        f"friction_{friction:g}", title, Motion(friction=friction, trim=_wander(3.0)), also=also, start=2.0
+    )
 
 
 _STANDING = (
@@ -249,7 +289,7 @@ _STANDING = (
     Condition(
         "freed",
         "lever held by friction from power-on, freed after 30 s",
-        Motion(friction=30.0, freed=EVENT),
+        Motion(friction=Steps(30.0, (EVENT,), (0.0,))),
         (_RIGHT_OR_FLAGGED, most("settled", 2.0, "median")),
         start=2.0,
         events=((0.0, EVENT),),
@@ -259,13 +299,13 @@ _STANDING = (
 )
 
 
-def _drawn(name: str, title: str, dither: float) -> Condition:
+def _drawn(name: str, title: str, torque: Excitations) -> Condition:
     """Return errors drawn from what the settings state."""
     gain, delay, friction = 0.02, 0.5e-3, 0.05
     return Condition(
         name,
         title,
-        Motion(friction_sigma=friction, dither=dither),
+        Motion(friction_sigma=friction, torque=torque),
         _ALL_COVERED,
         sensors=Sensors(z_ddot_gain_sigma=gain, z_ddot_delay_sigma=delay, tau_m_gain_sigma=gain),
         settings={
@@ -297,8 +337,8 @@ _CALIBRATION = (
         sensors=Sensors(z_ddot_gain=1.05, z_ddot_delay=3e-3, tau_m_gain=0.9),
         settings={"z_ddot_gain": 1.05, "z_ddot_delay": 3e-3, "tau_m_gain": 0.9, "lever_friction": 0.2},
     ),
-    _drawn("calibration_drawn", "gains, delay and friction drawn from their stated σ", 0.3),
-    _drawn("calibration_drawn_base_only", "gains, delay and friction drawn from their stated σ, no dither", 0.0),
+    _drawn("calibration_drawn", "gains, delay and friction drawn from their stated σ", DITHER),
+    _drawn("calibration_drawn_base_only", "gains, delay and friction drawn from their stated σ, no dither", ()),
 )
 
 
@@ -342,15 +382,15 @@ _GRIP_FORCE = (
 )
 
 
-def _pilot(name: str, title: str, dither: float) -> Condition:
+def _pilot(name: str, title: str, torque: Excitations) -> Condition:
     """Return a pilot whose arm is not the lever model's."""
     limits = (most("θ/z̈ rms", 10.0), least("θ/z̈ covered", 85.0))
-    return Condition(name, title, Motion(pilot=name, dither=dither), limits, (least("mismatch", 90.0),))
+    return Condition(name, title, Motion(pilot=name, torque=torque), limits, (least("mismatch", 90.0),))
 
 
 def _hand(name: str, title: str) -> Condition:
     """Return a hand as Mayo measured it, and the firmware's model of such hands: no flag excuses it."""
-    return replace(_pilot(name, f"{title}, model hand", 0.0), name=f"{name}_hand", unless=(), model="hand")
+    return replace(_pilot(name, f"{title}, model hand", ()), name=f"{name}_hand", unless=(), model="hand")
 
 
 def _reported(condition: Condition) -> Condition:
@@ -359,19 +399,19 @@ def _reported(condition: Condition) -> Condition:
 
 
 _PILOTS = (
-    _pilot("two_dof", "arm on a trunk on a seat", 0.3),
-    _pilot("mayo_ectomorphic", "Mayo's ectomorphic pilot", 0.0),
-    _pilot("mayo_mesomorphic", "Mayo's mesomorphic pilot", 0.0),
+    _pilot("two_dof", "arm on a trunk on a seat", DITHER),
+    _pilot("mayo_ectomorphic", "Mayo's ectomorphic pilot", ()),
+    _pilot("mayo_mesomorphic", "Mayo's mesomorphic pilot", ()),
     replace(
-        _pilot("two_dof", "arm on a trunk on a seat, whose frequency is set", 0.3),
+        _pilot("two_dof", "arm on a trunk on a seat, whose frequency is set", DITHER),
         name="two_dof_seat",
         settings={"seat_frequency": 4.5},
     ),
     _hand("mayo_ectomorphic", "Mayo's ectomorphic pilot"),
     _hand("mayo_mesomorphic", "Mayo's mesomorphic pilot"),
     _hand("mayo_random", "hands about Mayo's two pilots"),
-    _reported(_pilot("hysteretic", "arm with hysteretic damping", 0.3)),
-    _reported(_pilot("reflex", "arm with a stretch reflex after 35 ms", 0.3)),
+    _reported(_pilot("hysteretic", "arm with hysteretic damping", DITHER)),
+    _reported(_pilot("reflex", "arm with a stretch reflex after 35 ms", DITHER)),
 )
 
 CONDITIONS = {

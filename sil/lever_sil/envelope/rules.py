@@ -11,11 +11,13 @@ from dataclasses import replace
 
 from ..acceptance.result import Limit
 from ..batch.firmware import ClosedLoop
-from ..batch.motions import EVENT, Motion
+from ..batch.motions import BASE, EVENT, Motion, noise
 from ..batch.sensors import CLOCK, Sensors
+from ..plants.excitation import Sine
 from ..plants.sensors import Fault, Late, Scale, Stuck
+from ..plants.trajectories import Moves, Steps
 from .condition import Condition
-from .conditions import FAILING, QUIET, least, most, right
+from .conditions import FAILING, QUIET, least, most, right, sway
 
 _G = 9.80665  # [m/s^2]
 _LONG = Motion(duration=140.0)  # 40 seeds, two runs each, from 20 s on: 2.7 h
@@ -42,17 +44,22 @@ def _jump(name: str, title: str, motion: Motion, median: float, p90: float, wors
     )
 
 
+def _times(factor: float) -> Steps:
+    """Return how a parameter changes at once."""
+    return Steps(1.0, (EVENT,), (factor,))
+
+
 _JUMPS = (
-    _jump("jump_k_1.4", "k_p × 1.4 at once", Motion(jump=(1.0, 1.4)), 0.5, 1.0, 2.5),
+    _jump("jump_k_1.4", "k_p × 1.4 at once", Motion(k_p=_times(1.4)), 0.5, 1.0, 2.5),
     _jump(
         "jump_ck_1.3_base_only",
         "c_p and k_p × 1.3 at once, no dither",
-        Motion(jump=(1.3, 1.3), dither=0.0),
+        Motion(torque=(), c_p=_times(1.3), k_p=_times(1.3)),
         0.7,
         1.8,
         8.0,
     ),
-    _jump("jump_k_0.6", "k_p × 0.6 at once", Motion(jump=(1.0, 0.6)), 0.8, 1.8, 4.0),
+    _jump("jump_k_0.6", "k_p × 0.6 at once", Motion(k_p=_times(0.6)), 0.8, 1.8, 4.0),
 )
 
 
@@ -65,11 +72,17 @@ def _long(name: str, title: str, motion: Motion, limits: tuple[Limit, ...]) -> C
     return Condition(name, title, motion, limits, also=("changes", *_SHARES), runs=2)
 
 
+def _retrims(degrees: float, every: float) -> Moves:
+    """Return how a pilot re-trims every so often [s], by up to so much, in a second."""
+    return Moves(0.0, math.radians(degrees), every, 1.0)
+
+
+_SQUALLS = Steps(1.0, (20.0, 40.0, 60.0, 80.0, 100.0, 120.0), (10.0, 1.0) * 3)
 _NO_CHANGE = (
     _long(
         "rough_begins",
         "rough air, process noise 0.5, 20 s on and 20 s off",
-        replace(_LONG, rough=(0.5, 20.0)),
+        replace(_LONG, gusts=_SQUALLS),
         (most("changes", 10.0), most("f_n rms", 4.0), most("silent share", 1.0), most("CALIBRATION share", 5.0)),
     ),
     _long(
@@ -81,7 +94,7 @@ _NO_CHANGE = (
     _long(
         "retrims",
         "re-trim by up to 3° in 1 s, each 8 s",
-        replace(_LONG, retrims=(3.0, 8.0, 1.0)),
+        replace(_LONG, trim=_retrims(3.0, 8.0)),
         (most("changes", 90.0), most("f_n rms", 1.45)),
     ),
     _long("steady_long", "steady flight", _LONG, (most("changes", 5.5), most("f_n rms", 0.86))),
@@ -106,7 +119,9 @@ _FRICTION = (
         _stick_slip(f"stick_slip_{torque:g}", f"{torque:g} N m of friction from power-on", Motion(friction=torque), 2.0)
         for torque in (1.0, 1.5, 2.0)
     ),
-    _stick_slip("stick_slip_begins", "1.5 N m of friction from 30 s on", Motion(friction=1.5, tightened=EVENT), EVENT),
+    _stick_slip(
+        "stick_slip_begins", "1.5 N m of friction from 30 s on", Motion(friction=Steps(0.0, (EVENT,), (1.5,))), EVENT
+    ),
 )
 
 _SLOW = {"learn_period": 0.1}
@@ -133,8 +148,8 @@ _BLOCKS = (
     ),
 )
 
-_SWAY = Motion(sway=(5.0, 0.3), dither=0.0)
-_RETRIM = Motion(retrims=(5.0, 4.0, 1.0), dither=0.0)
+_SWAY = Motion(torque=(), trim=sway(5.0, 0.3))
+_RETRIM = Motion(torque=(), trim=_retrims(5.0, 4.0))
 _BURSTS = {
     "lever_lost": ("half of the LEVER_SAMPLEs lost", ClosedLoop()),
     "lever_10ms": ("a fifth of the LEVER_SAMPLEs lost, 10 ms at a time", ClosedLoop(lost=0.2, lost_for=0.01)),
@@ -179,8 +194,8 @@ def _large(name: str, title: str, motion: Motion) -> Condition:
 
 
 _LARGE = (
-    _large("large_sine", "base 0.35 g rms at 3.5 Hz besides", Motion(base_sine=(math.sqrt(2.0) * 0.35 * _G, 3.5))),
-    _large("large_broadband", "base 0.5 g rms, 1–10 Hz", Motion(base=0.5 * _G)),
+    _large("large_sine", "base 0.35 g rms at 3.5 Hz besides", Motion(base=(*BASE, Sine(rms=0.35 * _G, frequency=3.5)))),
+    _large("large_broadband", "base 0.5 g rms, 1–10 Hz", Motion(base=noise(0.5 * _G))),
 )
 
 
@@ -189,7 +204,7 @@ def _delay(rate: int) -> Condition:
     return Condition(
         f"delay_told_{rate}hz",
         f"accelerometer 4 ms late, as set, {rate} Hz, rotor vibration of 0.1 g at 17 Hz",
-        Motion(base_sine=(0.1 * _G, 17.0)),
+        Motion(base=(*BASE, Sine(rms=0.1 * _G / math.sqrt(2.0), frequency=17.0))),
         limits=(most("CALIBRATION share", 5.0), *right(2.0)),
         sensors=Sensors(z_ddot_delay=delay),
         settings={"z_ddot_delay": delay, "sample_period": 1.0 / rate},

@@ -12,9 +12,9 @@ from lever_cdkf.firmware.config import Config
 
 from ..acceptance.excerpt import Excerpt
 from ..acceptance.result import ConditionResult
-from ..batch import firmware, pilots, plant
+from ..batch import firmware, pilots
 from ..batch.firmware import ClosedLoop
-from ..batch.motions import Motion, Recording, lanes, truth
+from ..batch.motions import Motion, Recording, simulated
 from ..batch.sensors import measured
 from .condition import Condition
 from .measure import FIGURES, Outcome, excerpt
@@ -121,23 +121,13 @@ def _recordings(jobs: Iterable[Job], tick: Tick) -> Iterator[tuple[Job, Recordin
         else:
             batch = batches.setdefault(job.group.motion.duration, [])
             if sum(len(each.seeds) for each in (*batch, job)) > _most_lanes(job.group.motion.duration):
-                yield from _simulated(batch, tick)
+                yield from _side_by_side(batch, tick)
                 batch.clear()
             batch.append(job)
     for batch in batches.values():
-        yield from _simulated(batch, tick)
+        yield from _side_by_side(batch, tick)
 
 
-def _simulated(batch: Sequence[Job], tick: Tick) -> Iterator[tuple[Job, Recording]]:
-    """Yield motions of one duration, side by side."""
-    if not batch:
-        return
-    given = [lanes(job.group.motion, job.seeds) for job in batch]
-    theta, theta_dot = plant.run(plant.beside(given), tick)
-    first = 0
-    for job, part in zip(batch, given, strict=True):
-        own = slice(first, first + len(job.seeds))
-        first = own.stop
-        signals = (theta[:, own], theta_dot[:, own], part.tau_m, part.z_ddot)
-        force = plant.grip_force(part, *signals[:2])
-        yield job, Recording(job.group.motion.time, *signals, truth(part), grip_force=force)
+def _side_by_side(batch: Sequence[Job], tick: Tick) -> Iterator[tuple[Job, Recording]]:
+    """Yield motions of one duration."""
+    yield from zip(batch, simulated([(job.group.motion, job.seeds) for job in batch], tick), strict=True)

@@ -21,7 +21,7 @@ from .bus import Interval
 from .judge import Requirement
 from .readings import wrong
 
-MOTION = Motion(duration=40.0, dither=0.0)
+MOTION = Motion(duration=40.0, torque=())
 """The firmware makes the dither."""
 TIME = (15.0, 25.0)
 """Of the faults [s]."""

@@ -144,7 +144,7 @@ class GaussMarkov(Normalised):
         left = math.exp(-step / self.correlation_time)
         white = math.sqrt(1.0 - left * left) * rng.standard_normal(len(time))
         white[0] = rng.standard_normal()
-        return autoregressive(white, left)
+        return np.array(list(accumulate(white, lambda last, new: left * last + new)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,11 +182,6 @@ class Pulses(Excitation):
         period, width = max(1, round(self.period / step)), round(self.width / step)
         sign = np.where((sample // period) % 2 == 0, 1.0, -1.0)
         return self.amplitude * sign * (sample % period < width)
-
-
-def autoregressive(noise: FloatArray, left: float) -> FloatArray:
-    """Return the process x[k] = left x[k - 1] + noise[k] along the first axis, from x[0] = noise[0]."""
-    return np.array(list(accumulate(noise, lambda last, new: left * last + new)))
 
 
 KINDS: dict[str, type[Excitation]] = {

@@ -100,18 +100,24 @@ class Fatigue(Trajectory):
         return self.last + (self.first - self.last) * np.exp(-elapsed / self.time_constant)
 
 
+def _read_phase(value: Any, place: Place) -> float | None:
+    """Read a phase [rad]; "random" is None."""
+    return None if value == "random" else read_quantity("rad")(value, place)
+
+
 @dataclass(frozen=True)
 class Sinusoid(Trajectory):
-    """`mean` and a sine of `amplitude` and `frequency` about it."""
+    """`mean` and a sine of `amplitude` and `frequency` about it; a `phase` that is None is random."""
 
     mean: float = quantity(SIGNAL)
     amplitude: float = quantity(SIGNAL)
     frequency: float = quantity("Hz", above=0.0)
-    phase: float = quantity("rad", 0.0)
+    phase: float | None = item(_read_phase, default=0.0)
 
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return a sine about `mean`."""
-        return self.mean + self.amplitude * np.sin(2.0 * math.pi * self.frequency * time + self.phase)
+        phase = rng.uniform(0.0, 2.0 * math.pi) if self.phase is None else self.phase
+        return self.mean + self.amplitude * np.sin(2.0 * math.pi * self.frequency * time + phase)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,6 +129,30 @@ class Noise(excitation.Noise, Trajectory):
     def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return band-limited noise about `mean`."""
         return self.mean + self.samples(time, rng)
+
+
+@dataclass(frozen=True)
+class Moves(Trajectory):
+    """A move up or down each `every`, of random size and in `duration`, never further than `greatest` from `first`."""
+
+    first: float = quantity(SIGNAL)
+    greatest: float = quantity(SIGNAL, least=0.0)
+    every: float = quantity("s", above=0.0)
+    duration: float = quantity("s", above=0.0)
+
+    def __post_init__(self) -> None:
+        if self.duration > self.every:
+            raise ValueError(f"duration {self.duration:g} s is longer than every {self.every:g} s")
+
+    def values(self, time: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return straight moves of uniformly distributed size; one that would lead too far goes the other way."""
+        starts = self.every * np.arange(1.0, time[-1] // self.every + 1.0)
+        places = [0.0]
+        for move in rng.uniform(-self.greatest, self.greatest, len(starts)).tolist():
+            places.append(places[-1] + (move if abs(places[-1] + move) <= self.greatest else -move))
+        knots = np.stack((starts, starts + self.duration), axis=1).ravel()
+        moved: FloatArray = np.interp(time, np.append(0.0, knots), np.repeat(places, 2)[:-1])
+        return self.first + moved
 
 
 @dataclass(frozen=True)
@@ -183,6 +213,7 @@ KINDS: Mapping[str, type[Trajectory]] = {
     "fatigue": Fatigue,
     "sinusoid": Sinusoid,
     "noise": Noise,
+    "moves": Moves,
     "random_walk": RandomWalk,
     "sequence": Sequence,
 }

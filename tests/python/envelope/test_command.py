@@ -72,7 +72,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_run_is_the_same_whoever_is_simulated_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [
-        Condition("wander", "", Motion(duration=3.0, wander=3.0), start=1.0),
+        Condition("sway", "", Motion(duration=3.0, trim=conditions.sway(3.0, 0.3)), start=1.0),
         Condition("steady", "", Motion(duration=3.0, friction=0.1), start=1.0),
     ]
     together = run_conditions.run(rows, {}, 3, lambda *_: None)
@@ -94,7 +94,7 @@ def test_every_row_of_the_rules_is_measured() -> None:
         assert not any(np.isnan(values).any() for values in result.values.values())
         assert len(result.values["f_n rms"]) == result.condition.runs
     jumps = {
-        result.condition.name: result.values["settled"] for result in results if result.condition.motion.jump[1] != 1
+        result.condition.name: result.values["settled"] for result in results if result.condition.motion.k_p != 1.0
     }
     assert jumps.keys() == {"jump_k_1.4", "jump_ck_1.3_base_only", "jump_k_0.6"}
     assert all(0.0 < settled < 30.0 for settled in jumps.values())
@@ -102,7 +102,7 @@ def test_every_row_of_the_rules_is_measured() -> None:
 
 @pytest.mark.parametrize("whole", [False, True])
 def test_the_firmware_dithers_the_lever_while_samples_are_lost(whole: bool) -> None:
-    motion, loop = Motion(duration=4.0, dither=0.0), ClosedLoop(dither=0.3, lost=0.5, whole=whole)
+    motion, loop = Motion(duration=4.0, torque=()), ClosedLoop(dither=0.3, lost=0.5, whole=whole)
     recording, track = firmware.closed_loop(Config(), motion, range(2), loop, lambda: None)
     assert np.all(np.std(recording.tau_m[2000:], axis=0) > 0.15)
     missing = np.mean(track.faults & fault_mask("THETA") != 0)

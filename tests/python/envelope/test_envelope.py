@@ -13,12 +13,14 @@ from lever_cdkf.firmware.estimator import DO_NOT_TRUST, Estimator, feed
 from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.batch import firmware, motions, pilots, plant
 from lever_sil.batch.firmware import RESPONSE_STRIDE, Feedthrough, Track
-from lever_sil.batch.motions import Motion, Recording
+from lever_sil.batch.motions import Motion, Recording, noise
 from lever_sil.batch.sensors import CLOCK, SENSORS, Sensors, lost, measured
 from lever_sil.envelope import measure
 from lever_sil.envelope.measure import FIGURES, Outcome, fault_mask
 from lever_sil.plants import lever_plant as sil_plant
+from lever_sil.plants.pilots import HandsOff
 from lever_sil.plants.sensors import INVALID, Reads, Scale, Spikes, Stuck
+from lever_sil.plants.trajectories import Ramp, Steps
 from lever_sil.plants.truth import Conditions
 from numpy.typing import NDArray
 
@@ -34,7 +36,7 @@ def lever() -> sil_plant.Lever:
 
 
 def test_plant_is_the_one_of_sil_by_another_integration() -> None:
-    given = motions.lanes(replace(QUIET, dither=0.0), SEEDS)
+    given = motions.lanes(replace(QUIET, torque=()), SEEDS)
     theta, theta_dot = plant.run(given)
     for run in SEEDS:
         columns = [np.full(len(theta), getattr(given, name)[0, run]) for name in ("m_p", "c_p", "k_p", "trim")]
@@ -51,7 +53,7 @@ def test_plant_is_the_one_of_sil_by_another_integration() -> None:
 
 
 def test_friction_holds_a_lever_that_is_driven_by_less_until_it_is_freed() -> None:
-    given = motions.lanes(Motion(duration=2.0, friction=30.0, freed=1.0), SEEDS)
+    given = motions.lanes(Motion(duration=2.0, friction=Steps(30.0, (1.0,), (0.0,))), SEEDS)
     theta, theta_dot = plant.run(given)
     held = np.arange(len(theta)) <= 1000
     assert np.all(theta[held] == theta[0])
@@ -62,7 +64,7 @@ def test_friction_holds_a_lever_that_is_driven_by_less_until_it_is_freed() -> No
 def test_friction_takes_its_share_of_each_half_swing() -> None:
     """Coulomb friction T on a spring K: each half swing is smaller by 2 T / K (Den Hartog)."""
     hardware = plant.Hardware(damping=0.0)
-    given = motions.lanes(replace(QUIET, duration=2.0, base=0.0, dither=0.0, friction=0.05), range(1))
+    given = motions.lanes(replace(QUIET, duration=2.0, base=(), torque=(), friction=0.05), range(1))
     given = replace(given, c_p=np.zeros((1, 1)), trim=np.full((1, 1), 0.3), hardware=hardware)
     lanes = plant.BatchPlant(given)
     lanes.theta[0] += 0.01
@@ -75,7 +77,7 @@ def test_friction_takes_its_share_of_each_half_swing() -> None:
 
 
 def test_a_lever_that_nobody_holds_swings_on_its_own_spring() -> None:
-    motion = replace(QUIET, base=0.0, dither=0.05, released=(0.0, 9.0))
+    motion = replace(QUIET, base=(), torque=noise(0.05), hands_off=(HandsOff(start=0.0, end=9.0),))
     given = replace(motions.lanes(motion, SEEDS), hardware=plant.Hardware(damping=0.0))
     theta, theta_dot = plant.run(replace(given, tau_m=given.tau_m * (np.arange(8001)[:, None] < 2000)))
     energy = 0.5 * 0.08075 * theta_dot**2 + 0.5 * 5.0 * (theta - given.trim) ** 2
@@ -84,7 +86,7 @@ def test_a_lever_that_nobody_holds_swings_on_its_own_spring() -> None:
 
 @pytest.mark.parametrize("pilot", ["two_dof", "mayo_ectomorphic", "hysteretic", "reflex"])
 def test_pilots_of_sil_answer_the_base_as_their_response_says(pilot: str) -> None:
-    recording = pilots.record(Motion(duration=20.0, dither=0.0, process_noise=0.0, pilot=pilot), range(1))
+    recording = pilots.record(Motion(duration=20.0, torque=(), process_noise=0.0, pilot=pilot), range(1))
     spectrum = [np.fft.rfft(column[:-1, 0] * np.hanning(20000)) for column in (recording.theta, recording.z_ddot)]
     at = np.arange(2 * 20, 8 * 20 + 1, 5)
     seen = np.array([np.vdot(spectrum[1][i - 3 : i + 4], spectrum[0][i - 3 : i + 4]) for i in at])
@@ -96,93 +98,55 @@ def test_pilots_of_sil_answer_the_base_as_their_response_says(pilot: str) -> Non
 # --- motions ---------------------------------------------------------------------------------------------------------
 
 
+def given(**asked: Any) -> plant.Lanes:
+    return motions.lanes(Motion(duration=10.0, **asked), range(4))
+
+
 def test_what_the_pilot_does_is_as_asked() -> None:
-    """Against runs of the same seeds in which he does nothing, at 29 s, and when all has happened."""
-    seeds, still = range(4), motions.lanes(Motion(duration=40.0), range(4))
-    time = np.arange(40_001) * 1e-3
-
-    def given(**asked: object) -> plant.Lanes:
-        return motions.lanes(Motion(duration=40.0, **asked), seeds)  # type: ignore[arg-type]
-
-    retrimmed = np.degrees(given(retrim=8.0).trim - still.trim)
-    np.testing.assert_allclose(
-        retrimmed, np.interp(time, (30.0, 34.0), (0.0, 8.0))[:, None] + np.zeros((1, 4)), atol=1e-9
-    )
-    factor = np.array((1.0, -1.0, 1.0, -1.0))
-    for asked, angle, seconds in (({"grip": 1.3}, 1.0, 0.05), ({"grip": 1.3, "grip_moves": (3.0, 0.5)}, 3.0, 0.5)):
-        gripped, moment = given(**asked), np.interp(time, (30.0, 30.0 + seconds), (0.0, 1.0))[:, None]
-        for name in ("c_p", "k_p"):
-            changed = getattr(gripped, name) / getattr(still, name)
-            np.testing.assert_allclose(changed, 1.0 + (1.3**-factor - 1.0) * moment, rtol=1e-9)
-        moved = np.degrees(gripped.trim - still.trim)
-        np.testing.assert_allclose(moved, angle * moment + np.zeros((1, 4)), atol=1e-9)
-    ramp = np.interp(time, (20.0, 35.0), (42.0, 18.0))[:, None] + np.zeros((1, 4))
-    np.testing.assert_allclose(given(damping=(42.0, 18.0, 20.0, 35.0)).c_p, ramp)
-    swaying = np.degrees(given(sway=(2.0, 0.3)).trim - still.trim)
-    assert np.ptp(swaying, axis=0) == pytest.approx(4.0, rel=1e-4)
-    np.testing.assert_allclose(swaying[10_000:20_000:100], swaying[:10_000:100], atol=1e-9)  # three periods later
-    wandering = np.degrees(given(wander=1.0).trim - still.trim)
-    assert np.sqrt(np.mean(wandering**2, axis=0)) == pytest.approx(1.0)
-    paused, moving = given(pause=(20.0, 30.0)), (time < 20.0) | (time >= 30.0)
-    for signal, other in ((paused.z_ddot, still.z_ddot), (paused.tau_m, still.tau_m), (paused.kick, still.kick)):
-        np.testing.assert_array_equal(signal, other * moving[:, None])
-    for asked, later in (({}, 1.0), ({"next_pilot": 2.0}, 2.0**-factor)):
-        released, held = given(released=(20.0, 30.0), **asked), np.where(time[:, None] < 20.0, 1.0, later)
-        for name in ("c_p", "k_p"):
-            np.testing.assert_allclose(getattr(released, name), getattr(still, name) * held * moving[:, None])
-        np.testing.assert_array_equal(released.m_p, still.m_p * moving[:, None])
-    jumped, since = given(jump=(1.3, 0.6)), (time >= 30.0)[:, None]
-    np.testing.assert_allclose(jumped.c_p / still.c_p, np.where(since, 1.3, 1.0) + np.zeros((1, 4)))
-    np.testing.assert_allclose(jumped.k_p / still.k_p, np.where(since, 0.6, 1.0) + np.zeros((1, 4)))
-    np.testing.assert_array_equal(jumped.trim, still.trim)
-    rubbing = given(friction=1.5, tightened=10.0, freed=30.0).friction
-    np.testing.assert_array_equal(rubbing[:, 0], 1.5 * ((time >= 10.0) & (time < 30.0)))
-    drawn = np.array([motions.lanes(Motion(duration=1.0, friction_sigma=0.05), range(200)).friction])
+    """Against runs of the same seeds in which he does nothing."""
+    still, time = given(), np.arange(10_001)[:, None] * 1e-3
+    later, moment = time >= 5.0, np.clip(time - 5.0, 0.0, 1.0)
+    step, ramp = Steps(1.0, (5.0,), (1.3,)), Ramp(0.0, 0.1, 5.0, 1.0)
+    changed = given(c_p=step, trim=ramp)
+    np.testing.assert_allclose(changed.c_p, still.c_p * np.where(later, 1.3, 1.0))
+    np.testing.assert_array_equal(changed.k_p, still.k_p)
+    np.testing.assert_allclose(changed.trim, still.trim + 0.1 * moment)
+    np.testing.assert_array_equal(changed.trim[:1], motions.arms(range(4))[3])
+    gripped = given(c_p=step, k_p=step, either_way=True)
+    factor = 1.3 ** np.array((-1.0, 1.0, -1.0, 1.0))
+    for name in ("c_p", "k_p"):
+        np.testing.assert_allclose(getattr(gripped, name), getattr(still, name) * np.where(later, factor, 1.0))
+    released = given(hands_off=(HandsOff(start=2.0, end=3.0), HandsOff(start=5.0, end=11.0)))
+    held = (time < 2.0) | (time >= 3.0) & ~later
+    for name in ("m_p", "c_p", "k_p"):
+        np.testing.assert_array_equal(getattr(released, name), getattr(still, name) * held)
+    rubbing = given(friction=Steps(0.0, (5.0,), (1.5,))).friction
+    np.testing.assert_array_equal(rubbing, 1.5 * later + np.zeros((1, 4)))
+    drawn = motions.lanes(Motion(duration=1.0, friction=1.0, friction_sigma=0.05), range(200)).friction - 1.0
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(0.05, rel=0.15)
     assert (drawn > 0.0).all()
 
 
-def test_the_trim_moves_now_and_then() -> None:
-    """From each multiple of 8 s on, within a second."""
-    seeds = range(20)
-    still = motions.arms(seeds)[3]
-    moved = np.degrees(motions.lanes(Motion(duration=40.0, retrims=(3.0, 8.0, 1.0)), seeds).trim - still)
-    places = moved[[0, *range(9000, 40_001, 8000)]]
-    np.testing.assert_allclose(moved[8000::8000], places, atol=1e-9)
-    np.testing.assert_allclose(moved[8500::8000], 0.5 * (places[1:] + places[:-1]), atol=1e-9)
-    moves = np.abs(np.diff(places, axis=0))
-    assert 2.5 < moves.max() <= 3.0
-    assert np.mean(moves) == pytest.approx(1.5, rel=0.2)
-    assert np.abs(places).max() <= 3.0
-
-
-def test_what_disturbs_the_lever_is_as_asked() -> None:
-    """rms and, of a torque that is slow, its correlation; of what is in a band, where its power is."""
-    seeds = range(6)
-    slow = motions.lanes(Motion(duration=60.0, slow_torque=0.7), seeds).disturbance
-    assert np.sqrt(np.mean(slow**2)) == pytest.approx(0.7, rel=0.1)
-    assert np.mean(slow[300:] * slow[:-300]) / np.mean(slow**2) == pytest.approx(math.exp(-1.0), abs=0.08)
-    wide = motions.lanes(Motion(duration=20.0, base=0.8, dither=0.2, process_noise=0.07, tremor=0.3, wander=2.0), seeds)
+def test_what_moves_the_lever_is_as_asked() -> None:
+    """Each run and each excitation draws its own."""
+    usual, more = given(), given(base=(*motions.BASE, *noise(2.0, 17.0, 18.0)), disturbance=noise(0.3, 3.0, 5.0))
     for signal, rms, low, high in (
-        (wide.z_ddot, 0.8, 1.0, 10.0),
-        (wide.tau_m, 0.2, 1.0, 10.0),
-        (wide.disturbance, 0.3, 3.0, 5.0),
-        (wide.trim - motions.arms(seeds)[3], math.radians(2.0), 0.05, 0.5),
+        (usual.z_ddot, 1.0, 1.0, 10.0),
+        (usual.tau_m, 0.3, 1.0, 10.0),
+        (more.z_ddot - usual.z_ddot, 2.0, 17.0, 18.0),
+        (more.disturbance, 0.3, 3.0, 5.0),
     ):
-        assert np.sqrt(np.mean(signal**2, axis=0)) == pytest.approx(rms)
+        np.testing.assert_allclose(np.sqrt(np.mean(signal**2, axis=0)), rms)
         power = np.sum(np.abs(np.fft.rfft(signal, axis=0)) ** 2, axis=1)
         frequency = np.fft.rfftfreq(len(signal), 1e-3)
-        inside = (frequency > 0.95 * low) & (frequency < 1.02 * high)
-        assert power[inside].sum() > 0.999999 * power.sum()
-        assert power[inside & (frequency > 0.5 * (low + high))].sum() > 0.3 * power.sum()
-    assert np.std(wide.kick) == pytest.approx(0.07 * math.sqrt(1e-3), rel=0.02)
-    rough = motions.lanes(Motion(duration=20.0, process_noise=0.07, rough=(0.5, 5.0), base_sine=(2.0, 17.0)), seeds)
-    for first, noise in ((0, 0.07), (5000, 0.5), (10_000, 0.07), (15_000, 0.5)):
-        assert np.std(rough.kick[first : first + 5000]) == pytest.approx(noise * math.sqrt(1e-3), rel=0.02)
-    added = rough.z_ddot - motions.lanes(Motion(duration=20.0), seeds).z_ddot
-    power = np.abs(np.fft.rfft(added[:-1], axis=0)) ** 2
-    assert np.all(power[17 * 20] > 0.999999 * power.sum(axis=0))
-    np.testing.assert_allclose(np.std(added, axis=0), 2.0 / math.sqrt(2.0), rtol=1e-3)
+        assert power[(frequency > 0.95 * low) & (frequency < 1.02 * high)].sum() > 0.999999 * power.sum()
+    first, second = (more.z_ddot - usual.z_ddot)[:, :2].T
+    apart = (usual.z_ddot[:, 0], usual.z_ddot[:, 1], usual.tau_m[:, 0], first, second, more.disturbance[:, 0])
+    assert np.abs(np.corrcoef(apart) - np.eye(6)).max() < 0.6
+    assert not usual.disturbance.any()
+    rough = given(process_noise=0.07, gusts=Steps(1.0, (5.0,), (4.0,))).kick
+    assert np.std(rough[:5000]) == pytest.approx(0.07 * math.sqrt(1e-3), rel=0.02)
+    assert np.std(rough[5000:]) == pytest.approx(0.28 * math.sqrt(1e-3), rel=0.02)
 
 
 # --- sensors ---------------------------------------------------------------------------------------------------------

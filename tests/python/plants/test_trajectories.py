@@ -48,6 +48,16 @@ def test_fatigue_falls_with_its_time_constant() -> None:
 def test_sinusoid_has_its_mean_amplitude_and_frequency() -> None:
     wave = values({"kind": "sinusoid", "mean": "10 N/m", "amplitude": "3 N/m", "frequency": "0.25 Hz"})
     assert wave[[0, 1000, 2000, 3000]] == pytest.approx([10.0, 13.0, 10.0, 7.0])
+    shifted = {"kind": "sinusoid", "mean": "10 N/m", "amplitude": "3 N/m", "frequency": "0.25 Hz", "phase": "180 deg"}
+    assert values(shifted)[[0, 1000, 2000, 3000]] == pytest.approx([10.0, 7.0, 10.0, 13.0])
+
+
+def test_sinusoid_of_random_phase_begins_anywhere() -> None:
+    wave = {"kind": "sinusoid", "mean": "10 N/m", "amplitude": "3 N/m", "frequency": "0.25 Hz", "phase": "random"}
+    waves = np.stack([values(wave, seed) for seed in range(200)]) - 10.0
+    assert np.hypot(waves[:, 0], waves[:, 1000]) == pytest.approx(3.0)
+    turns = np.arctan2(waves[:, 0], waves[:, 1000]) / (2.0 * math.pi) + 0.5
+    assert np.histogram(turns, 4, (0.0, 1.0))[0] == pytest.approx(50, abs=20)
 
 
 def test_noise_has_its_mean_and_exactly_its_rms_in_its_band_and_its_window() -> None:
@@ -60,6 +70,20 @@ def test_noise_has_its_mean_and_exactly_its_rms_in_its_band_and_its_window() -> 
     assert power[(frequency < 0.049) | (frequency > 0.501)].sum() < 1e-20 * power.sum()
     assert not np.allclose(path, values(noise, seed=1))
     assert trajectory(noise).changes() == ()
+
+
+def test_moves_are_straight_of_every_size_and_stay_near() -> None:
+    """Each 8 s, within a second."""
+    moves = {"kind": "moves", "first": "10 N/m", "greatest": "3 N/m", "every": "8 s", "duration": "1 s"}
+    moved = np.stack([values(moves, seed) for seed in range(20)], axis=1) - 10.0
+    places = moved[[0, *range(9000, 40_000, 8000)]]
+    np.testing.assert_allclose(moved[8000::8000], places[:-1], atol=1e-9)
+    np.testing.assert_allclose(moved[8500::8000], 0.5 * (places[1:] + places[:-1]), atol=1e-9)
+    sizes = np.abs(np.diff(places, axis=0))
+    assert 2.5 < sizes.max() <= 3.0
+    assert np.mean(sizes) == pytest.approx(1.5, rel=0.2)
+    assert 2.0 < np.abs(places).max() <= 3.0
+    assert trajectory(moves).changes() == ()
 
 
 def test_random_walk_has_its_rate_and_stays_between_its_limits() -> None:
@@ -104,7 +128,11 @@ def test_sequence_takes_one_part_after_the_other_and_knows_its_jumps() -> None:
             {"kind": "noise", "mean": "1 N/m", "rms": "1 N/m", "low": "2 Hz", "high": "1 Hz"},
             "low 2 Hz is not below high 1 Hz",
         ),
-        ({"kind": "wobble"}, "one of steps, ramp, fatigue, sinusoid, noise, random_walk, sequence"),
+        (
+            {"kind": "moves", "first": "1 N/m", "greatest": "1 N/m", "every": "2 s", "duration": "3 s"},
+            "duration 3 s is longer than every 2 s",
+        ),
+        ({"kind": "wobble"}, "one of steps, ramp, fatigue, sinusoid, noise, moves, random_walk, sequence"),
     ],
 )
 def test_nonsense_is_refused_with_place_and_remedy(value: Any, message: str) -> None:

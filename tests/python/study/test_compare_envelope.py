@@ -26,7 +26,7 @@ from python.conftest import Refused
 
 Array = NDArray[Any]  # of floats
 SHORT = Motion(duration=6.0)
-MOVED = Condition("moved", "±5° at 0.3 Hz", dataclasses.replace(SHORT, sway=(5.0, 0.3)), start=4.0)
+MOVED = Condition("moved", "±5° at 0.3 Hz", dataclasses.replace(SHORT, trim=conditions.sway(5.0, 0.3)), start=4.0)
 
 
 # --- the high-pass ---------------------------------------------------------------------------------------------------
@@ -97,7 +97,7 @@ def test_steady_flight_does_not_and_missing_samples_are_skipped() -> None:
         ("theta", Reads(value=INVALID, start=1.0, end=1.5)),
         ("z_ddot", Reads(value=INVALID, start=2.0, end=2.2)),
     )
-    (log,) = logs.logs([Condition("steady", "", SHORT, sensors=Sensors(faults=faults), start=4.0)], 2)
+    (log,) = logs.logs([Condition("steady", "", SHORT, sensors=Sensors(faults=faults), start=4.0)], 8)
     for name in filters.JOINT_FILTERS:
         rms, covered = measured(log, name)
         assert rms < 4.0, name

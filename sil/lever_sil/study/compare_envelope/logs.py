@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from lever_cdkf.errors import SettingsError
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.numeric.arrays import Array
 
-from ...batch import firmware, pilots, plant
+from ...batch import firmware, pilots
 from ...batch.firmware import ClosedLoop
-from ...batch.motions import Motion, Recording, arms, lanes, truth
+from ...batch.motions import Motion, Recording, arms, simulated
 from ...batch.sensors import Sensors, lost, measured
 from ...envelope.condition import Condition
 from ...plants.sensors import INVALID
@@ -50,45 +49,25 @@ def chunks(conditions: Iterable[Condition], seeds: int) -> list[list[Condition]]
 
 def logs(chunk: Sequence[Condition], seeds: int) -> Iterator[Log]:
     """Yield the logs of a chunk; equal motions are simulated once."""
-    recordings = _recordings({_key(condition) for condition in chunk if condition.closed_loop is None}, seeds)
+    recordings = _recordings({(each.motion, range(seeds * each.runs)) for each in chunk if each.closed_loop is None})
     for condition in chunk:
         own = range(seeds * condition.runs)
         trim = arms(own)[3][0]
         if condition.closed_loop is not None:
             yield _closed_loop(condition, condition.closed_loop, own, trim)
         else:
-            recording = recordings[_key(condition)]
+            recording = recordings[condition.motion, own]
             signals = measured(recording, condition.sensors, own)
             yield Log(
                 condition, recording, signals, trim, _firmware(condition, signals, recording.response is not None)
             )
 
 
-class _Key(NamedTuple):
-    """Conditions with the same of this have the same recording."""
-
-    motion: Motion
-    runs: int
-
-
-def _key(condition: Condition) -> _Key:
-    return _Key(condition.motion, condition.runs)
-
-
-def _recordings(keys: Iterable[_Key], seeds: int) -> dict[_Key, Recording]:
+def _recordings(keys: Iterable[tuple[Motion, range]]) -> dict[tuple[Motion, range], Recording]:
     """Return all recordings of a chunk: arms are simulated side by side, other pilots one by one."""
-    recordings = {key: pilots.record(key.motion, range(seeds * key.runs)) for key in keys if key.motion.pilot != "arm"}
-    given = {key: lanes(key.motion, range(seeds * key.runs)) for key in keys if key.motion.pilot == "arm"}
-    if not given:
-        return recordings
-    theta, theta_dot = plant.run(plant.beside(list(given.values())))
-    first = 0
-    for key, part in given.items():
-        own = slice(first, first + seeds * key.runs)
-        first = own.stop
-        signals = (theta[:, own], theta_dot[:, own], part.tau_m, part.z_ddot)
-        recordings[key] = Recording(key.motion.time, *signals, truth(part))
-    return recordings
+    held = [key for key in keys if key[0].pilot == "arm"]
+    others = {key: pilots.record(*key) for key in keys if key[0].pilot != "arm"}
+    return others | dict(zip(held, simulated(held), strict=True))
 
 
 def _firmware(condition: Condition, signals: Mapping[str, Array], response: bool) -> firmware.Track | None:
