@@ -1,17 +1,21 @@
-"""Tables as text in so many columns of a terminal. No number and no word is ever cut."""
+"""Tables by Rich in so many columns of a terminal. No number is cut or folded: a wide table becomes several."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import count, zip_longest
 
-from .layout import text_width, words, wrapped
+from rich.box import SIMPLE_HEAD
+from rich.cells import cell_len
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
-_PROSE = 32
-"""A column of text is wrapped to no less; if it has less, it goes beneath the row."""
-_NAME_LINES = 3
+from .layout import words, wrapped
+
+PROSE = 32
+"""Wider text is prose, which is folded, to no less than this, or stands beneath its row."""
+_HEADING_LINES = 3
 _INDENT = "    "
 
 
@@ -22,98 +26,61 @@ class Column:
     name: str
     cells: Sequence[str]
     is_number: bool
-    """Stands to the right, and is not wrapped."""
+    """Stands to the right."""
+    is_prose: bool
 
-    @property
-    def natural(self) -> int:
-        """The columns that it takes on one line."""
-        return max(map(text_width, (self.name, *self.cells)))
-
-    @property
-    def least(self) -> int:
-        """The columns that it needs: its name is wrapped, text as far as it can be read well."""
-        longest = max(map(text_width, words(self.name)))
-        name = next(width for width in count(longest) if len(wrapped(self.name, width)) <= _NAME_LINES)
-        cells = max(map(text_width, self.cells))
-        if not self.is_number:
-            cells = max(min(_PROSE, cells), *(text_width(word) for cell in self.cells for word in words(cell)), 0)
-        return max(name, cells)
+    def least(self, folded: bool) -> int:
+        """Return the columns of a terminal that it needs, with its name on one line or folded."""
+        name = cell_len(self.name)
+        if folded:
+            name = max([-(-name // _HEADING_LINES), *map(cell_len, words(self.name))])
+        whole = [word for cell in self.cells for word in words(cell)] if self.is_prose else self.cells
+        return max([name, PROSE if self.is_prose else 0, *map(cell_len, whole)])
 
 
 def table_lines(columns: Sequence[Column], width: int) -> list[str]:
-    """Return a table in `width` columns.
+    """Return a table in `width` columns of a terminal.
 
-    What is too wide has its names and texts wrapped; then texts at the end stand beneath their rows; then it is folded
-    into blocks that repeat the first column; and at last each row stands upright.
+    Where it is too wide, its headings and prose are folded; then prose stands beneath the rows; and at last it becomes
+    several tables that repeat the first columns.
     """
-    for beside in range(len(columns), 0, -1):
-        widths = _widths(columns[:beside], width)
-        if widths:
-            return list(_block(columns[:beside], widths, columns[beside:], width))
-        if columns[beside - 1].is_number or columns[beside - 1].natural <= _PROSE:
-            break
-    keys = _keys(columns)
-    blocks = _blocks(columns[:keys], columns[keys:], width)
-    if blocks:
-        return [line for block in blocks for line in ("", *table_lines(block, width))][1:]
-    rows = range(len(columns[0].cells))
-    return [line for row in rows for line in ("", *upright_lines(columns, row, width))][1:]
+    if _fit(columns, width):
+        return _drawn(columns, width)
+    keys = list(columns[: _keys(columns)])
+    blocks = [keys]
+    for column in columns[len(keys) :]:
+        if column.is_prose:
+            continue
+        if blocks[-1] == keys or _fit([*blocks[-1], column], width):
+            blocks[-1] = [*blocks[-1], column]
+        else:
+            blocks.append([*keys, column])
+    *others, last = (_drawn(block, width) for block in blocks)
+    beneath = [column for column in columns if column.is_prose]
+    head = len(last) - len(keys[0].cells)
+    lines = [line for block in others for line in (*block, "")] + last[: head - 1]
+    lines += [*(f"{_INDENT}{column.name}" for column in beneath), last[head - 1]]
+    for i, line in enumerate(last[head:]):
+        texts = (wrapped(column.cells[i], width - len(_INDENT)) for column in beneath if column.cells[i])
+        lines += [line, *(f"{_INDENT}{part}" for text in texts for part in text)]
+    return lines
 
 
-def upright_lines(columns: Sequence[Column], row: int, width: int) -> Iterator[str]:
-    """Yield a row as lines of name, value and unit, which is in brackets at the end of the name."""
-    named = [re.fullmatch(r"(.*?)(?: \[(.*)\])?", column.name) for column in columns]
-    entries = [
-        (match[1], f"{cell} {match[2]}" if cell and match[2] not in (None, "1") else cell or "-")
-        for match, cell in zip(named, (column.cells[row] for column in columns), strict=True)
-        if match is not None
-    ]
-    left = max(text_width(name) for name, _ in entries)
-    needed = max(text_width(word) for _, value in entries for word in words(value))
-    if left + needed + 4 > width:
-        for name, value in entries:
-            yield from (f"  {name}", *(f"{_INDENT}{line}" for line in wrapped(value, width - len(_INDENT))))
-        return
-    for name, value in entries:
-        first, *others = wrapped(value, width - left - 4)
-        yield f"  {name}{' ' * (left - text_width(name))}  {first}"
-        yield from (f"  {' ' * left}  {other}" for other in others)
+def upright_lines(columns: Sequence[Column], width: int) -> list[str]:
+    """Return the first row as lines of name, value and unit, which is in brackets at the end of the name."""
+    names, values = [], []
+    for column in columns:
+        name, _, unit = column.name.removesuffix("]").partition(" [")
+        names.append(f"  {name}")
+        values.append(
+            f"{column.cells[0]} {unit}" if column.cells[0] and unit not in ("", "1") else column.cells[0] or "-"
+        )
+    both = [Column("", names, False, False), Column("", values, False, max(map(cell_len, values)) > PROSE)]
+    return _drawn(both, width)[2:]
 
 
-def _widths(columns: Sequence[Column], width: int) -> list[int] | None:
-    """Return the widths of the columns beside each other; None if there is no room for them."""
-    gaps = 2 * (len(columns) - 1)
-    widths = [column.least for column in columns]
-    if sum(widths) + gaps > width:
-        return None
-    spare = width - sum(widths) - gaps
-    for i, column in sorted(enumerate(columns), key=lambda each: each[1].is_number):
-        more = min(spare, column.natural - widths[i])
-        widths[i] += more
-        spare -= more
-    return widths
-
-
-def _block(columns: Sequence[Column], widths: Sequence[int], beneath: Sequence[Column], width: int) -> Iterator[str]:
-    head = [wrapped(column.name, size) for column, size in zip(columns, widths, strict=True)]
-    height = max(map(len, head))
-    yield from _row([[""] * (height - len(lines)) + lines for lines in head], columns, widths)
-    yield from (f"{_INDENT}{column.name}" for column in beneath)
-    yield "-" * min(width, sum(widths) + 2 * (len(widths) - 1))
-    for i in range(len(columns[0].cells)):
-        cells = [wrapped(column.cells[i], size) for column, size in zip(columns, widths, strict=True)]
-        yield from _row(cells, columns, widths)
-        for column in beneath:
-            yield from (f"{_INDENT}{line}" for line in wrapped(column.cells[i], width - len(_INDENT)) if line)
-
-
-def _row(cells: Sequence[Sequence[str]], columns: Sequence[Column], widths: Sequence[int]) -> Iterator[str]:
-    for line in zip_longest(*cells, fillvalue=""):
-        parts = []
-        for text, column, size in zip(line, columns, widths, strict=True):
-            blank = " " * (size - text_width(text))
-            parts.append(blank + text if column.is_number else text + blank)
-        yield "  ".join(parts).rstrip()
+def _fit(columns: Sequence[Column], width: int, folded: bool = True) -> bool:
+    return sum(column.least(folded) + 2 for column in columns) - 2 <= width
 
 
 def _keys(columns: Sequence[Column]) -> int:
@@ -122,14 +89,24 @@ def _keys(columns: Sequence[Column]) -> int:
     return 2 if len(set(first)) < len(first) == len(set(zip(first, *others, strict=True))) else 1
 
 
-def _blocks(keys: Sequence[Column], others: Sequence[Column], width: int) -> list[list[Column]]:
-    """Return columns that fit beside each other, each block with the keys in front; none if one alone does not."""
-    blocks: list[list[Column]] = []
-    for column in others:
-        if blocks and _widths([*blocks[-1], column], width):
-            blocks[-1].append(column)
-        elif _widths([*keys, column], width):
-            blocks.append([*keys, column])
-        else:
-            return []
-    return blocks
+def _drawn(columns: Sequence[Column], width: int) -> list[str]:
+    """Return what Rich draws; a line that needs more than `width` has it."""
+    shown = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+    folded = not _fit(columns, width, folded=False)
+    for column in columns:
+        least = column.least(folded)
+        shown.add_column(
+            Text("\n".join(wrapped(column.name, least))),
+            justify="right" if column.is_number else "left",
+            overflow="fold",
+            min_width=least,
+            max_width=None if column.is_prose else least,
+        )
+    for row in zip(
+        *([Text(cell, no_wrap=not column.is_prose) for cell in column.cells] for column in columns), strict=True
+    ):
+        shown.add_row(*row)
+    console = Console(width=width, color_system=None)
+    with console.capture() as captured:
+        console.print(shown, crop=False)
+    return [line.rstrip() for line in captured.get().splitlines()]

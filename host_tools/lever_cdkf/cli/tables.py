@@ -6,11 +6,14 @@ import argparse
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from ..runtime.files import json_text, write_text
 from ..runtime.provenance import provenance
 from .layout import UNLIMITED, terminal_width, wrapped
-from .table_layout import Column, table_lines, upright_lines
+
+if TYPE_CHECKING:
+    from .table_layout import Column
 
 Cell = str | float | bool | None
 Row = Mapping[str, Cell]
@@ -34,6 +37,8 @@ def print_tables(
 
     On a terminal they fit its width, and a table of one row stands upright; elsewhere a row is a line.
     """
+    from .table_layout import table_lines, upright_lines
+
     if json_file is not None:
         write_json(json_file, tables, inputs)
     width = terminal_width()
@@ -42,21 +47,23 @@ def print_tables(
             columns = _columns(rows, digits)
             print(*wrapped(title, width), sep="\n")
             stands = len(rows) == 1 and width < UNLIMITED
-            lines = upright_lines(columns, 0, width) if stands else table_lines(columns, width)
+            lines = upright_lines(columns, width) if stands else table_lines(columns, width)
             print(*lines, "", sep="\n")
         else:
             print(*wrapped(f"{title}: none", width), "", sep="\n")
 
 
 def _columns(rows: Sequence[Row], digits: int) -> list[Column]:
-    return [
-        Column(
-            name,
-            [_text(row[name], digits) for row in rows],
-            all(_is_number(row[name]) or row[name] is None for row in rows),
+    from .table_layout import PROSE, Column
+
+    columns: list[Column] = []
+    for name in rows[0]:
+        cells = [_text(row[name], digits) for row in rows]
+        is_number = all(_is_number(row[name]) or row[name] is None for row in rows)
+        columns.append(
+            Column(name, cells, is_number, bool(columns) and not is_number and len(max(cells, key=len)) > PROSE)
         )
-        for name in rows[0]
-    ]
+    return columns
 
 
 def write_json(path: str, tables: Tables, inputs: Iterable[str | os.PathLike[str]] = ()) -> None:

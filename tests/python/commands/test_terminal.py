@@ -157,6 +157,43 @@ def test_one_row_stands_upright(capsys: pytest.CaptureFixture[str], monkeypatch:
     assert lines == [["run"], ["samples", "3000"], ["mean", "NIS", "1.988"], ["time", "0.25", "s"], ["bias", "-"], []]
 
 
+@pytest.mark.parametrize("width", [20, 40, 80])
+def test_numbers_of_one_row_stay_whole(
+    width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    print_tables({"run": [{"count of all samples": 1234567890123456, "remark": "of the base, and of the lever " * 3}]})
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "  count of all samples  1234567890123456"
+    assert " ".join(" ".join(lines[2:]).split()) == ("remark" + " of the base, and of the lever" * 3)
+    assert_fits("\n".join(lines), max(width, columns("  count of all samples  ") + 32))
+
+
+@pytest.mark.parametrize("width", [40, 70, 80, 90])
+def test_a_long_word_stays_whole(
+    width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A sparkline, or the path of a file, beside a number and beside prose."""
+    monkeypatch.setenv("COLUMNS", str(width))
+    word, prose = "▁▂▃▄▅▆▇█" * 5, "of the base, and of the lever " * 3
+    print_tables({"signals": [{"name": name, "mean [rad]": 1.2345, "plot": word, "why": prose} for name in "ab"]})
+    text = capsys.readouterr().out
+    assert text.count(word) == text.count("1.234") == 2
+    assert "…" not in text
+
+
+def test_a_heading_is_not_folded_inside_a_unit(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    print_tables(
+        {"run": [{"name": name, "damping of the arm [N s/m]": 1.5, "of the lever [N m]": 2.5} for name in "ab"]}
+    )
+    heading = capsys.readouterr().out.split("─")[0]
+    assert "[N s/m]" in heading
+    assert "[N m]" in heading
+
+
 def test_numbers_have_four_digits_and_counts_all(capsys: pytest.CaptureFixture[str]) -> None:
     numbers = [2094.5678, 0.0123456, 123456.7, 1e-5, 5.0, 1.5e12]
     print_tables({"numbers": [{"n": number, "count": 1234567} for number in numbers]})
