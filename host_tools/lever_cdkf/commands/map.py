@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     from ..runtime.files import write_text
     from ..runtime.provenance import provenance
     from ..signals.mapping import as_toml
-    from ..signals.plots import KINDS, OTHER, write
+    from ..signals.plots import KINDS, write
     from ..signals.proposal import propose
     from ..signals.recorded import notes_of
 
@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
         write_text(args.toml, origin.comment() + as_toml(mapping))
     if args.out is not None:
         shown = [(each.key, each.signal) for each in proposed]
-        write(args.out, shown + [(OTHER, each) for each in changing], Path(args.log).name, origin)
+        write(args.out, shown + [("", each) for each in changing], Path(args.log).name, origin)
     if written := [str(path) for path in (args.toml, args.out) if path is not None]:
         layout.say(f"Written: {', '.join(written)}")
     return 0

@@ -4,6 +4,7 @@ A colour is a name with "@": page.js puts in what page.css says for it, so a fig
 Several charts in one figure are rows: row 0 on top, all over the same x axis.
 """
 
+import html
 import math
 from dataclasses import dataclass, field
 from typing import Any
@@ -100,6 +101,11 @@ class Figure:
             self.shapes.append(
                 {"type": "line", "x0": moment, "x1": moment, "y0": 0, "y1": 1, "yref": "paper", "line": style}
             )
+
+    def name_row(self, row: int, text: str) -> None:
+        """Put a name, as plain text, above a row, at its left end."""
+        where = {"xref": "paper", "x": 0, "xanchor": "left", "yref": f"y{row + 1 if row else ''} domain", "y": 1}
+        self.annotations.append({"text": html.escape(text), "showarrow": False, "yanchor": "bottom"} | where)
 
     def level(self, *values: float) -> None:
         """Dotted lines across the first row at values of its axis."""

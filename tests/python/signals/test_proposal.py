@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import shlex
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from lever_cdkf.signals import plots, proposal
 from lever_cdkf.signals.bus_signals import load_database
 from lever_cdkf.signals.recorded import Signal
 from python.conftest import Refused
+from python.report.reading import figures, read, unpack
 from python.signals.databases import AIRCRAFT, WITH_TORQUE, WITHHELD, Aircraft, database
 from python.signals.flight import NATURAL_FREQUENCY, Flight, write_log
 from python.signals.test_mapped_replay import frequency, replayed
@@ -67,7 +67,10 @@ def test_the_proposal_can_be_used_as_it_is(folder: Path, tmp_path: Path, capsys:
     assert main(["map", str(log), "--dbc", str(dbc), "--toml", str(toml), "-o", str(page)]) == 0
     said = capsys.readouterr().out
     assert "--map theta=InceptorPosition.LvrAngle theta_dot=InceptorPosition.LvrRate z_ddot=AhrsAccel.AccVert" in said
-    assert page.read_text().count("<svg") == 4
+    shown = figures(read(page))
+    notes = {key: [note["text"] for note in spec["layout"]["annotations"]] for key, spec in shown.items()}
+    assert [text.split(":")[0] for text in notes["figure-inputs"]] == ["theta", "theta_dot", "z_ddot"]
+    assert len(shown["figure-others"]["data"]) == len(notes["figure-others"]) == 1
     assert "5 other signals never change" in said  # foreign.dbc has nine
     assert "▁" in said
     assert f"Written: {toml}, {page}" in " ".join(said.split())
@@ -117,12 +120,32 @@ def test_what_has_no_unit_is_proposed_with_one(
     assert "one of them is in another unit" not in capsys.readouterr().out
 
 
-def test_a_signal_that_begins_later_is_drawn_later(tmp_path: Path) -> None:
+def test_a_signal_that_begins_later_is_drawn_later_and_a_gap_as_a_gap(tmp_path: Path) -> None:
+    """Short signals value by value; long ones as the least and the greatest of each stretch, none across a gap."""
     values = np.arange(100.0)
-    signals = [("theta", Signal("early", 5.0 + values, values)), ("theta", Signal("late", 45.0 + values, values))]
+    time = np.concatenate((np.linspace(5.0, 15.0, 10_000), np.linspace(65.0, 75.0, 10_000)))
+    signals = [
+        ("theta", Signal("early", 5.0 + values, values, "<rad>")),
+        ("theta_dot", Signal("late", 45.0 + values, values)),
+        ("", Signal("long", time, np.sin(40.0 * time))),
+        ("", Signal("empty", time[:0], time[:0])),
+    ]
     plots.write(tmp_path / "page.html", signals, "title", provenance())
-    starts = re.findall(r'<path d="M([\d.]+) ', (tmp_path / "page.html").read_text())
-    assert float(starts[1]) - float(starts[0]) == pytest.approx((640 - 84 - 20) * 40.0 / 139.0, abs=1.0)
+    shown = figures(read(tmp_path / "page.html"))
+    early, late = ({axis: unpack(trace[axis]) for axis in "xy"} for trace in shown["figure-inputs"]["data"])
+    assert (early["x"][0], late["x"][0], early["x"][-1], late["x"][-1]) == (0.0, 40.0, 99.0, 139.0)
+    assert early["y"].tolist() == values.tolist()
+    assert shown["figure-inputs"]["layout"]["annotations"][0]["text"] == "theta: early, 0 to 99 &lt;rad&gt;"
+    assert [spec["layout"]["xaxis"]["range"] for spec in shown.values()] == [[0.0, 139.0]] * 2
+    trace, empty = shown["figure-others"]["data"]
+    assert len(unpack(empty["x"])) == 0
+    x, y = unpack(trace["x"]), unpack(trace["y"])
+    assert len(x) < 1300
+    (gap,) = np.flatnonzero(np.isnan(y))
+    assert x[gap - 1] == pytest.approx(10.0, abs=0.05)
+    assert x[gap + 1] == pytest.approx(60.0, abs=0.05)
+    assert np.nanmin(y) == pytest.approx(-1.0, abs=1e-3)
+    assert np.nanmax(y) == pytest.approx(1.0, abs=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ import pytest
 from lever_cdkf.firmware.config import setting
 from lever_cdkf.firmware.native import enum_names, settings_table
 from lever_cdkf.report import figure as drawing
+from lever_cdkf.report.printed import charts as sheet_of
 from lever_cdkf.runtime import interrupts
 from lever_cdkf.runtime.provenance import provenance
 from lever_sil.scenarios import scenario
@@ -27,7 +28,6 @@ from lever_sil.study.compare.entrants import entrants, tuning_name, wrongly_tune
 from lever_sil.study.compare.evaluation import Row
 from lever_sil.study.compare.run_cases import Outcome, Results
 from lever_sil.study.data import Batch, Estimates
-from lever_sil.study.figures import printed as sheets
 from numpy.typing import NDArray
 from python.conftest import Refused, Run
 from python.report.reading import Reader, figures, unpack
@@ -599,7 +599,7 @@ def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.Monkey
 def test_a_logarithmic_axis_is_one_in_print() -> None:
     figure = drawing.Figure([drawing.axis("y")], drawing.axis("x", type="log"), 200, over_time=False)
     figure.add(drawing.line(np.array([0.1, 1.0, 10.0]), np.ones(3), "name", "estimate"))
-    (axes,) = sheets.charts([("", figure.spec())], 3.0, "double").axes
+    (axes,) = sheet_of([("", figure.spec())], 3.0, "double").axes
     assert axes.get_xscale() == "log"
 
 

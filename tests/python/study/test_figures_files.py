@@ -8,6 +8,7 @@ import functools
 import hashlib
 import html
 import importlib.metadata
+import importlib.resources
 import io
 import itertools
 import json
@@ -24,11 +25,11 @@ import pytest
 import screenshot
 from fontTools.ttLib import TTFont
 from lever_cdkf.cli.main import main
+from lever_cdkf.report.typesetting import colours, in_html, in_mathtext
 from lever_cdkf.runtime.provenance import provenance
 from lever_sil.study.figures import catalogue, figures_page, printed, runs
 from lever_sil.study.figures.description import Band, Column, Curve, Figure, Points, Row, Surface
 from lever_sil.study.figures.paper import PAPER
-from lever_sil.study.figures.typesetting import colours, css, in_html, in_mathtext
 from PIL import Image
 from PIL.PngImagePlugin import PngImageFile
 from python.report.reading import figures, read, unpack
@@ -301,7 +302,8 @@ def test_captions_are_the_same_on_the_page_and_beside_the_pictures(folder: Path)
 
 def test_every_colour_of_the_page_exists_in_both_themes(folder: Path) -> None:
     used = set(re.findall(r'"@([\w-]+)"', json.dumps(figures(read(folder / "figures.html")))))
-    light, dark = (set(re.findall(r"--([\w-]+):", part)) for part in (css(), "".join(css().split("@media")[1:])))
+    style = (importlib.resources.files("lever_cdkf.report") / "page.css").read_text(encoding="utf-8")
+    light, dark = (set(re.findall(r"--([\w-]+):", part)) for part in (style, "".join(style.split("@media")[1:])))
     assert used
     assert used <= light
     assert used <= dark

@@ -9,9 +9,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from lever_cdkf.exports import pictures
 from lever_cdkf.report.figure import Spec
+from lever_cdkf.report.printed import charts, values
 from lever_cdkf.runtime.provenance import Provenance
-
-from ..figures.printed import charts, values
 
 KINDS = ("pdf", "svg")
 COLUMNS = ("series", "lane", "x", "y", "error")

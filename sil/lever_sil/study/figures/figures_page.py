@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.resources import files
 
 from lever_cdkf.report.page import Page
+from lever_cdkf.report.typesetting import in_html
 
 from . import plotted
 from .description import Figure
 from .maps import MapFigure
-from .typesetting import in_html, own_css
 
 
 def build(figures: Sequence[Figure | MapFigure]) -> str:
@@ -23,7 +24,7 @@ def build(figures: Sequence[Figure | MapFigure]) -> str:
         heading = f'<span class="number">{number}.</span> {in_html(figure.title)}'
         caption = f'<p class="caption">{in_html(figure.caption)}</p>'
         page.section(figure.name, figure.name.capitalize(), heading, _charts(page, figure), caption)
-    return page.html("", own_css())
+    return page.html("", (files(__package__) / "figures.css").read_text(encoding="utf-8"))
 
 
 def _charts(page: Page, figure: Figure | MapFigure) -> str:

@@ -11,10 +11,10 @@ import numpy as np
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.report import figure as chart
 from lever_cdkf.report.series import packed
+from lever_cdkf.report.typesetting import in_html
 
 from .description import LOOKS, Band, Column, Figure, Points, Surface, Trace
 from .maps import RED, TICKS, Line, MapFigure, Scale, across, written
-from .typesetting import in_html
 
 _INCH, _ROOM = 130, 110  # [pixels] of a chart for an inch in print, and for legend and x axis
 _DOT = 2.5  # [pixels]

@@ -30,20 +30,11 @@ def in_mathtext(text: str) -> str:
     return _ACCENT.sub(lambda match: f"${_ACCENTS[match[2]]}{{{match[1]}}}$", indexed)
 
 
-def own_css() -> str:
-    """Return the style of the page beyond that of a report."""
-    return (files(__package__) / "figures.css").read_text(encoding="utf-8")
-
-
-def css() -> str:
-    """Return the whole style of the page."""
-    return (files("lever_cdkf.report") / "page.css").read_text(encoding="utf-8") + own_css()
-
-
 @cache
 def colours() -> Mapping[str, Colour]:
     """Return the colours of the light theme by name."""
-    light = re.sub(r"@media[^{]*dark[^{]*\{\s*:root[^{]*\{[^}]*\}\s*\}", "", css())
+    style = (files(__package__) / "page.css").read_text(encoding="utf-8")
+    light = re.sub(r"@media[^{]*dark[^{]*\{\s*:root[^{]*\{[^}]*\}\s*\}", "", style)
     return {name: _colour(value) for name, value in _COLOUR.findall(light) if value.startswith(("#", "rgba"))}
 
 
