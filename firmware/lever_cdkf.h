@@ -360,7 +360,7 @@ enum lever_fault {
     LEVER_FAULT_DUPLICATE = 8192,   /* another estimator has spoken on this bus within the last 2 s */
     LEVER_FAULT_SETTLING = 16384,   /* nothing is learnt: the levels of the signals have not settled yet */
     LEVER_FAULT_MISMATCH = 32768,   /* innovations are not white, or the lever sticks: something that the model lacks */
-    LEVER_FAULT_CALIBRATION = 65536, /* torque, base and grip force do not agree on the pilot */
+    LEVER_FAULT_CALIBRATION = 65536, /* the measured inputs do not agree on the pilot: one is wrong or wrongly scaled */
     LEVER_FAULT_HANDS_OFF = 131072   /* nobody holds the lever; nothing is learnt */
 };
 
