@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -75,3 +76,25 @@ def test_the_error_of_a_stated_margin_is_from_the_true_one(sigma: float, covered
     stated["gain_margin_sigma"] = sigma
     figures = measure._margins(replace(flown, stability=stated))
     assert figures == pytest.approx({"margin covered": covered, "margin rms": 1.0, "margin stated": 100.0})
+
+
+def test_a_correction_is_harmful_while_the_corrected_angle_swings_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For a second and a quarter after the fault it adds half of the motion; at all other times it takes half away."""
+    time = 1e-3 * np.arange(round(1e3 * (measure.FAULT + 5.0)))
+    theta = 0.01 * np.sin(2.0 * np.pi * 3.0 * time)
+    adds = (time > measure.FAULT + 1.0) & (time < measure.FAULT + 2.25)
+    corrected = np.where(adds, 1.5, 0.5) * theta
+    flown = SimpleNamespace(
+        theta=0.3 + theta,
+        corrected=0.3 + corrected,
+        correction=corrected - theta,
+        truth=SimpleNamespace(rest=np.full(len(time), 0.3)),
+        during=lambda start, end: slice(*np.searchsorted(time, (start, end))),
+    )
+    monkeypatch.setattr(measure, "raised", lambda plan, _ratio: plan)
+    monkeypatch.setattr(measure, "fly", lambda _plan: flown)
+    monkeypatch.setattr(measure, "excerpt", lambda _flown: None)
+    measured = measure.harmful("puma_like", 1, mitigation="cancellation", spoil=lambda plan: plan)
+    assert measured.figures["adds for"] == pytest.approx(1.25, abs=0.1)
+    jump = np.abs(np.diff(corrected - theta)[round(1e3 * measure.FAULT) :]).max()
+    assert measured.figures["jump"] == pytest.approx(math.degrees(jump))

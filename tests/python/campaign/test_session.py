@@ -9,8 +9,11 @@ from typing import Any
 
 import pytest
 from distributed import KilledWorker
-from lever_sil.campaign import session
+from lever_cdkf.cli.main import main
+from lever_sil.campaign import chunks, session, spec
 from lever_sil.campaign.chunks import Chunk, Plan
+from lever_sil.commands import campaign
+from python.campaign.conftest import SMALL
 
 
 class Future:
@@ -103,3 +106,19 @@ def test_the_time_left_is_told_between_chunks_too(small: Plan, tmp_path: Path, m
     assert shown[0] == (0, small.spec.runs, f"0 of {small.spec.runs} runs kept")
     assert all(left.endswith("left") for _, _, left in shown[1:])
     assert shown[-1][:2] == (small.spec.runs, small.spec.runs)
+
+
+def test_flights_that_killed_their_workers_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, folder = tmp_path / "of_three.toml", tmp_path / "out"
+    file.write_text(SMALL.replace("chunk = 1", "chunk = 3"))
+    folder.mkdir()
+    plan = Plan(spec.load(str(file)))
+    lost = [plan.chunk(1), plan.chunk(7)]
+    for number in {*range(plan.count)} - {1, 7}:
+        chunks.make(plan, plan.chunk(number), folder)
+    made = session.Session(runs=36, seconds=1.0, lost=lost)
+    monkeypatch.setattr(campaign, "_run", lambda *_arguments: made)
+    assert main(["campaign", str(file), "-o", str(folder)]) == 1
+    assert "12 runs missing: flights 3 to 5, 21 to 23 killed their workers" in capsys.readouterr().err

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import itertools
+from typing import cast
 
 import numpy as np
 import pytest
+from lever_cdkf.replay.recorded_run import Kept, RecordedRun
 from lever_cdkf.replay.reduction import Ends, Groups, Stretches
+from lever_cdkf.report.bode import slow_trim
 from lever_cdkf.report.series import Welch, welch
+from lever_cdkf.results.summary import ReplaySummary
 
 Trace = dict[str, np.ndarray]
 
@@ -96,3 +100,14 @@ def test_a_spectrum_in_pieces_is_that_of_the_whole() -> None:
         averaged.add(part)
     for piecewise, whole in zip(averaged.spectrum(), welch(values, 1e-3), strict=True):
         np.testing.assert_allclose(piecewise, whole, rtol=1e-12)
+
+
+@pytest.mark.parametrize("there", ["estimate", "measured", "estimate measured"])
+def test_the_trim_is_that_of_the_estimate_where_there_is_one(there: str) -> None:
+    time = np.linspace(0.0, 20.0, 2000)
+    angles = {"estimate": 0.3 + 0.1 * np.sin(0.5 * time), "measured": 0.4 + 0.1 * np.sin(0.7 * time)}
+    kept = Kept(0.01)
+    kept.stretches.add({"time_s": time, **{f"theta_{name}_rad": angles[name] for name in there.split()}})
+    run = RecordedRun(kept, cast(ReplaySummary, None))
+    expected = slow_trim(time, angles[there.split()[0]], run.settings["trim_corner"])
+    np.testing.assert_array_equal(run.followed_trim, expected)

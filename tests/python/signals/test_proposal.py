@@ -73,6 +73,8 @@ def test_the_proposal_can_be_used_as_it_is(folder: Path, tmp_path: Path, capsys:
     assert len(shown["figure-others"]["data"]) == len(notes["figure-others"]) == 1
     assert "5 other signals never change" in said  # foreign.dbc has nine
     assert "▁" in said
+    commands = [shlex.split(line) for line in said.splitlines() if line.startswith(("lever tune ", "lever replay "))]
+    assert [words[2:5] for words in commands] == [[str(log), "--dbc", str(dbc)]] * 2
     assert f"Written: {toml}, {page}" in " ".join(said.split())
     summary = replayed(tmp_path / "out", log, "--dbc", dbc, "--map", toml)
     assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 from lever_cdkf.cli.main import main
+from lever_cdkf.cli.tables import Row
 from lever_cdkf.firmware.library import struct_dtype
 from lever_sil.scenarios import inputs
-from lever_sil.soak import flights, soak
+from lever_sil.soak import flights, soak, soak_page
+from python.report.reading import Reader, figures, unpack
 
 Content = dict[str, Any]
 
@@ -91,3 +93,25 @@ def test_wrong_hours_and_seeds_are_one_line(capsys: pytest.CaptureFixture[str], 
         assert "above 0, and at most 1000" in capsys.readouterr().err
     assert main(["soak", "--seed=-1"]) == 2
     assert "argument --seed: -1 is not from 0" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("troubles", [False, True])
+def test_the_page_shows_each_hour(troubles: bool) -> None:
+    hours = [judged(0.1, 0.1), judged(0.1, 0.05)]
+    memory = (100.0, 130.0 if troubles else 101.0)
+    result = soak.SoakResult(list(map(soak.Part, hours, memory)), 100.0, Counter())
+    rows: list[Row] = [part.sums.row() for part in result.parts]
+    page = Reader(soak_page.build(result, rows, "So it went."))
+    assert ("p", {"class": f"verdict {'bad' if troubles else 'good'}"}) in page.tags
+    chart = figures(page)["chart"]
+    shown = {trace["name"]: (trace["yaxis"], unpack(trace["y"]).tolist()) for trace in chart["data"]}
+    assert all(unpack(trace["x"]).tolist() == [1.0, 2.0] for trace in chart["data"])
+    assert shown["NEES"] == ("y", pytest.approx([1.0, 4.0], rel=1e-3))
+    assert shown["NIS"] == ("y", pytest.approx([1.0, 1.0], rel=1e-3))
+    for name in soak.QUANTITIES:
+        held = [row[f"{name} within 2 sigma [%]"] for row in rows]
+        assert shown[f"{name} within 2σ"] == ("y2", pytest.approx(held)), name
+    assert shown["memory"] == ("y3", list(memory))
+    assert chart["layout"]["xaxis"]["range"] == [0.5, 2.5]
+    assert [(shape["y0"], shape["y1"]) for shape in chart["layout"]["shapes"]] == [(1.0, 1.0)]
+    assert not chart["over_time"]

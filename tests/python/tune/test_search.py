@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 
 import numpy as np
@@ -146,3 +147,15 @@ def test_with_smaller_walks_a_change_counts_as_more_of_them(
     noise = Tuned("theta_noise", before=1.0, best=0.1, low=0.05, high=0.2)
     tuned = [Tuned(name, usual[name], value, low=value, high=value) for name, value in walks.items()]
     assert change_walk({}, [noise, *tuned]) == expected
+
+
+def test_the_error_of_a_gain_is_the_scatter_of_half_seconds() -> None:
+    """Gains that change sign every half a second: means over longer or shorter times scatter by another amount."""
+    gains = np.tile(np.repeat([3.0, -1.0], 50), 10)
+    before, after = (
+        validation.Fit(name, "as set", "held out", np.array(values, [("log_likelihood", "f8")]), 0.01)
+        for name, values in (("before", np.zeros(1000)), ("after", gains))
+    )
+    gained = validation.gain(before, after)
+    assert gained.mean == pytest.approx(1.0)
+    assert gained.error == pytest.approx(2.0 / math.sqrt(19.0))
