@@ -47,7 +47,36 @@ class LeverBusError(LeverError, CanInitializationError):
 
 
 class LeverBus(BusABC):
-    """See the module. `estimator` is the firmware instance, for a look at health() and estimate()."""
+    """The firmware as a bus; see the module.
+
+    `estimator` is the firmware instance, for a look at health() and estimate().
+
+    Parameters
+    ----------
+    channel
+        A name for logs.
+    can_filters
+        As of any bus of python-can.
+    config
+        Configuration of the firmware; its defaults if neither this nor `settings` is given.
+    settings
+        Instead of `config`: settings and choices by name, or the path of a settings file.
+    aircraft
+        The helicopter whose margin to collective bounce the firmware watches.
+    snapshots
+        Also send the state of the firmware so often, as SNAPSHOT [s].
+    receive_own_messages
+        Also receive what is sent, before the answers to it.
+    rx_queue_size
+        Most frames that wait to be received.
+    **kwargs
+        What python-can's tools pass to any bus, such as `bitrate`; it means nothing here.
+
+    Raises
+    ------
+    LeverBusError
+        An option is unknown or wrong; it is a CanInitializationError too.
+    """
 
     def __init__(
         self,
@@ -62,17 +91,6 @@ class LeverBus(BusABC):
         rx_queue_size: int = 65536,
         **kwargs: Any,
     ) -> None:
-        """Start the firmware in this process, as a bus.
-
-        :param channel: a name for logs
-        :param config: configuration of the firmware; its defaults if neither this nor `settings` is given
-        :param settings: instead of `config`: settings and choices by name, or the path of a settings file
-        :param aircraft: the helicopter whose margin to collective bounce the firmware watches
-        :param snapshots: [s] also send the state of the firmware so often, as SNAPSHOT
-        :param receive_own_messages: also receive what is sent, before the answers to it
-        :param rx_queue_size: most frames that wait to be received
-        :raises LeverBusError: (a CanInitializationError) with what is wrong
-        """
         unknown = sorted(kwargs.keys() - _MEANINGLESS)
         if unknown:
             raise LeverBusError(f"interface 'lever' has no option {', '.join(unknown)}; it has {_OPTIONS}")
@@ -97,7 +115,20 @@ class LeverBus(BusABC):
         super().__init__(channel, can_filters)
 
     def send(self, msg: Message, timeout: float | None = None) -> None:
-        """Hand a frame to the firmware and queue its answers; never wait."""
+        """Hand a frame to the firmware and queue its answers; never wait.
+
+        Parameters
+        ----------
+        msg
+            A classic frame.
+        timeout
+            Without meaning here.
+
+        Raises
+        ------
+        can.CanOperationError
+            The frame is one of CAN FD, or the bus is shut down.
+        """
         data = msg.data
         if msg.is_fd or len(data) > 8:
             raise CanOperationError(f"interface 'lever' is classic CAN: it has no FD frames and no {len(data)} bytes")
@@ -117,9 +148,24 @@ class LeverBus(BusABC):
             self._answer(is_sample)
 
     def recv(self, timeout: float | None = None) -> Message | None:
-        """Return the oldest frame not yet received; None after `timeout` seconds, or at once where none can come.
+        """Return the oldest frame not yet received.
 
         Overrides BusABC.recv, which would go on asking until the timeout has passed (without one, for ever).
+
+        Parameters
+        ----------
+        timeout
+            How long to wait [s]; None: until a frame comes.
+
+        Returns
+        -------
+        can.Message or None
+            None after the timeout, or at once where no frame can come.
+
+        Raises
+        ------
+        can.CanOperationError
+            The bus is shut down.
         """
         deadline = None
         while True:

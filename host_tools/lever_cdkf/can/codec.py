@@ -227,9 +227,23 @@ def _protected(word: int, identifiers: bytes) -> bytes:
 def encoder(name: str) -> Callable[..., bytes]:
     """Return a fast encoder of a message without multiplexing: counter, then each value in the order of the DBC.
 
-    It makes 8 bytes.
-
     encoder("LEVER_SAMPLE") takes (counter, theta, theta_dot, tau_m), encoder("BASE_SAMPLE") (counter, z_ddot, time_us).
+
+    Parameters
+    ----------
+    name
+        Of the message in lever.dbc.
+
+    Returns
+    -------
+    callable
+        It takes values in the units of the DBC, NaN for what is not available, and returns 8 bytes. It raises
+        CodecError for a value that its field cannot hold.
+
+    Raises
+    ------
+    CodecError
+        There is no such message, or it is multiplexed.
     """
     layout = _layout(name)
     if any(signal.is_multiplexer for signal in layout.contents.values()):
@@ -307,9 +321,24 @@ def encode(name: str, counter: int, values: Mapping[str, Value]) -> bytes:
 
 
 def decode(identifier: int, data: bytes | bytearray) -> tuple[str, dict[str, float]]:
-    """Return name and fields of a received frame, choices as numbers, NaN for what is not available.
+    """Return what a received frame says.
 
-    Raise CodecError if it is not in the DBC or corrupt.
+    Parameters
+    ----------
+    identifier
+        Of the frame.
+    data
+        Its 8 bytes.
+
+    Returns
+    -------
+    tuple of str and dict
+        Name of the message, and its fields in the units of lever.dbc: choices as numbers, NaN where not available.
+
+    Raises
+    ------
+    CodecError
+        The message is not in lever.dbc, or the frame is corrupt.
     """
     definition = message(identifier)
     if not check(identifier, data):

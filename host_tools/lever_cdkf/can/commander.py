@@ -43,7 +43,25 @@ class Commander:
         self._lock = threading.Lock()
 
     def send(self, values: Mapping[str, codec.Value], put: Callable[[int, bytes], None]) -> int:
-        """Have `put` send a COMMAND that changes only `values`; return its counter, 0 to 15. Raise CodecError."""
+        """Send a COMMAND that changes only `values`.
+
+        Parameters
+        ----------
+        values
+            Fields of COMMAND by name, in the units of lever.dbc.
+        put
+            What sends a frame, given its identifier and data.
+
+        Returns
+        -------
+        int
+            Its counter, 0 to 15, which the COMMAND_ACK repeats.
+
+        Raises
+        ------
+        CodecError
+            A field is unknown, or cannot hold its value.
+        """
         with self._lock:
             counter = self._counter
             data = codec.encode("COMMAND", counter, {"request": "none", **KEEP, **values})
@@ -53,7 +71,18 @@ class Commander:
 
 
 def result_of(ack: Mapping[str, float]) -> str:
-    """Return ACCEPTED, SEQUENCE or another result of lever.dbc, from the fields of a COMMAND_ACK."""
+    """Return what became of a COMMAND.
+
+    Parameters
+    ----------
+    ack
+        The fields of its COMMAND_ACK.
+
+    Returns
+    -------
+    str
+        ACCEPTED, SEQUENCE or another result of lever.dbc.
+    """
     number = int(ack["result"])
     choices = codec.message("COMMAND_ACK").get_signal_by_name("result").choices
     return str(choices[number]) if choices and number in choices else f"result {number}"

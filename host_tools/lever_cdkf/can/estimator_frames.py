@@ -38,15 +38,21 @@ def why_refused(corrupt: int, late: int) -> str:
 
 
 class EstimatorFrames:
-    """Picks the frames; the counts are of what has been read so far."""
+    """Picks the frames; the counts are of what has been read so far.
+
+    Parameters
+    ----------
+    recording
+        The logs.
+    channel
+        The bus that is read; None: the only one that has any samples.
+    start, length
+        The part of recorded time that is read [s]; COMMAND frames before it belong to it.
+    """
 
     def __init__(
         self, recording: Recording, channel: str | None = None, start: float = 0.0, length: float = float("inf")
     ) -> None:
-        """Read the bus `channel`; by default the only one that has any samples.
-
-        `start` and `length` [s] of recorded time say which part is read; COMMAND frames before it belong to it.
-        """
         self.recording = recording
         self._start, self._end = start or -math.inf, start + length  # a clock that was set back belongs to the whole
         self.channel = channel
@@ -72,7 +78,15 @@ class EstimatorFrames:
     def chunks(self) -> Iterator[Frames]:
         """Yield the estimator's frames, inputs and recorded answers, in recorded order.
 
-        Raise LogError without a sample.
+        Yields
+        ------
+        Frames
+            Those of a part of the recording, with recorded times [µs].
+
+        Raises
+        ------
+        LogError
+            The recording has no sample for the estimator, or cannot be read on.
         """
         waiting: list[Frames] = []
         for frames in self._part():
@@ -91,7 +105,13 @@ class EstimatorFrames:
             raise LogError(self._why_no_samples())
 
     def described(self) -> list[str]:
-        """Return what was left out, in words, an entry for each kind that occurred."""
+        """Return what was left out, in words.
+
+        Returns
+        -------
+        list of str
+            An entry for each kind of frame that occurred.
+        """
         return [f"{count:,} {_WORDS[kind]}" for kind, count in self.others.items() if count]
 
     def _part(self) -> Iterator[Frames]:
@@ -261,6 +281,23 @@ class _Pairing:
 
 
 def read_samples(traffic: EstimatorFrames) -> dict[str, NDArray[np.float64]]:
-    """Return all of sample_chunks() together."""
+    """Return all samples of a recording.
+
+    Parameters
+    ----------
+    traffic
+        The frames of the estimator, of which nothing has been read yet.
+
+    Returns
+    -------
+    dict
+        What run_samples() takes: time_us [µs], theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s²] and
+        grip_force [N], NaN where a value is not valid.
+
+    Raises
+    ------
+    LogError
+        The recording has no sample for the estimator, or cannot be read on.
+    """
     chunks = list(sample_chunks(traffic))
     return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}

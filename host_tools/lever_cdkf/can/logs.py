@@ -44,13 +44,22 @@ class LogError(LeverError):
 
 
 class Recording:
-    """One or several logs."""
+    """One or several logs, of which the first frames are read at once.
+
+    Parameters
+    ----------
+    paths
+        Of the logs, in any order: they are sorted by their first frames.
+    translated
+        Whether frames have the identifiers of lever.dbc, whatever they were on the bus.
+
+    Raises
+    ------
+    LogError
+        A log cannot be read, holds no frame, or is given twice.
+    """
 
     def __init__(self, paths: Iterable[str | os.PathLike[str]], *, translated: bool = True) -> None:
-        """Open the logs and read the first frames of each; raise LogError.
-
-        `translated`: with the identifiers of lever.dbc, whatever they were on the bus.
-        """
         self._translated = translated
         self.buses = Buses()
         self.damaged = 0
@@ -75,7 +84,18 @@ class Recording:
         return sum(self._done.values())
 
     def chunks(self) -> Iterator[Frames]:
-        """Yield all frames. Can be asked for once. Raise LogError."""
+        """Yield all frames; this can be asked for once.
+
+        Yields
+        ------
+        Frames
+            A part of them at a time, in recorded order, with recorded times [µs].
+
+        Raises
+        ------
+        LogError
+            A log cannot be read on.
+        """
         for chunks in self._chunks:
             yield from chunks
 

@@ -93,7 +93,20 @@ class Parameter(NamedTuple):
 def model_parameters(model: str) -> tuple[Parameter, ...]:
     """Return the parameters of a model, in the order of lever_estimate_t.
 
-    Raise SettingsError for a model that is none.
+    Parameters
+    ----------
+    model
+        A name of enum_names("lever_model").
+
+    Returns
+    -------
+    tuple of Parameter
+        Name and unit of each of the three.
+
+    Raises
+    ------
+    SettingsError
+        The firmware has no such model.
     """
     number = choice_value("lever_model", "model", model)
     return tuple(
@@ -108,10 +121,27 @@ def model_parameters(model: str) -> tuple[Parameter, ...]:
 class Config:
     """A configuration that the firmware accepts.
 
-    The choices are names of enum_names("lever_model"), "lever_preload", "lever_estimator", "lever_adaptation" and
-    "lever_mitigation"; `settings` go by name, in the units of settings_table(). What is not given is as in the
-    firmware's defaults: model "lever", preload "trim", estimator "dual", adaptation "robbins_monro", mitigation "none".
-    Raises SettingsError: one line that names key, unit and range.
+    What is not given is as in the firmware's defaults.
+
+    Parameters
+    ----------
+    model
+        A name of enum_names("lever_model"); default "lever".
+    preload
+        A name of enum_names("lever_preload"); default "trim".
+    estimator
+        A name of enum_names("lever_estimator"); default "dual".
+    adaptation
+        A name of enum_names("lever_adaptation"); default "robbins_monro".
+    settings
+        Values by name, in the units of settings_table().
+    mitigation
+        A name of enum_names("lever_mitigation"); default "none".
+
+    Raises
+    ------
+    SettingsError
+        The firmware would refuse it; one line names key, unit and range.
     """
 
     def __init__(

@@ -119,7 +119,18 @@ def make_command(request: str = "none", dither_rms: float | None = None, **choic
 
 
 class Estimator:
-    """An instance of the firmware. Any number may exist; each belongs to one thread at a time."""
+    """An instance of the firmware. Any number may exist; each belongs to one thread at a time.
+
+    Parameters
+    ----------
+    config
+        Its configuration; None: the firmware's defaults.
+
+    Raises
+    ------
+    LeverError
+        Config.pointer was changed after its check, and the firmware refuses it.
+    """
 
     def __init__(self, config: Config | None = None) -> None:
         self._memory = ffi.new("lever_memory_t *")  # holds the instance: both must live as long as this object
@@ -151,8 +162,27 @@ class Estimator:
     ) -> str:
         """Take a sample and return the mode after it.
 
-        Time [µs] (wrapped to 32 bits here), lever angle [rad] and rate [rad/s], motor torque [N m], vertical
-        acceleration of the base [m/s²], force of the hand on the lever [N]; None is missing or invalid.
+        A value that is None is missing or invalid.
+
+        Parameters
+        ----------
+        time_us
+            Time of the sample [µs]; it is wrapped to 32 bits here.
+        theta
+            Angle of the lever [rad].
+        theta_dot
+            Rate of the lever [rad/s].
+        tau_m
+            Torque of the motor [N m].
+        z_ddot
+            Vertical acceleration of the base, without gravity [m/s²].
+        grip_force
+            Force of the hand on the lever [N].
+
+        Returns
+        -------
+        str
+            A name of enum_names("lever_mode").
         """
         sample = self._sample
         sample.time_us = time_us & 0xFFFFFFFF
@@ -172,10 +202,25 @@ class Estimator:
         mitigation: str | None = None,
         dither_rms: float | None = None,
     ) -> None:
-        """Carry out a request ("none", "run", "freeze", "reset") before the next sample; None keeps a choice.
+        """Carry out a request before the next sample; None keeps a choice as it is.
 
-        dither_rms [N m] is the identification torque; 0 fades it out, None keeps it as it is. Torque and
-        correction fade out a second of sample time after the last command: repeat one. Raises LeverError.
+        Torque and correction fade out a second of sample time after the last command: repeat one.
+
+        Parameters
+        ----------
+        request
+            "none", "run", "freeze" or "reset".
+        model, preload, estimator, adaptation, mitigation
+            As in Config.
+        dither_rms
+            The identification torque [N m]; 0 fades it out.
+
+        Raises
+        ------
+        LeverError
+            The firmware refuses the command.
+        SettingsError
+            A name that the firmware does not know.
         """
         choices = zip(CHOICES, (model, preload, estimator, adaptation, mitigation), strict=True)
         command = make_command(request, dither_rms, **dict(choices))
@@ -183,11 +228,23 @@ class Estimator:
             raise LeverError(f"the firmware refused the command {request!r}, dither_rms = {dither_rms} N m")
 
     def idle(self, elapsed_us: int) -> None:
-        """No sample came for so long [µs] since the last one, or the last call of this: ages the torque gate."""
+        """Age the torque gate while no sample comes.
+
+        Parameters
+        ----------
+        elapsed_us
+            Time since the last sample, or the last call of this [µs].
+        """
         lib.lever_idle(self.pointer, elapsed_us)
 
     def estimate(self) -> Estimate:
-        """Return the estimate after the last sample."""
+        """Return the estimate after the last sample.
+
+        Returns
+        -------
+        Estimate
+            Each value with its unit and its standard deviation.
+        """
         lib.lever_estimate(self.pointer, self._estimate)
         values = {name: getattr(self._estimate, name) for name in Estimate._fields}
         for name in ("parameter", "parameter_sigma", "parameter_correlation"):
@@ -195,23 +252,48 @@ class Estimator:
         return Estimate(**values)
 
     def feedthrough(self, frequency: float) -> Feedthrough:
-        """Biodynamic feedthrough θ/z̈ at a frequency [Hz] after the last sample."""
+        """Return the biodynamic feedthrough θ/z̈ after the last sample.
+
+        Parameters
+        ----------
+        frequency
+            Where it is wanted [Hz].
+
+        Returns
+        -------
+        Feedthrough
+            The response [rad/(m/s²)] and how sure it is.
+        """
         raw = self._feedthrough
         lib.lever_feedthrough(self.pointer, frequency, raw)
         response = complex(raw.real, raw.imaginary)
         return Feedthrough(response, raw.gain_sigma, raw.phase_sigma, raw.correlation)
 
     def test_ratios(self) -> dict[str, float]:
-        """Return each statistic that is watched for faults and changes, over its threshold [1].
+        """Return each statistic that is watched for faults and changes, over its threshold.
 
-        Above 1 it is evidence.
+        Returns
+        -------
+        dict
+            By the names of TEST_RATIOS [1]; above 1 it is evidence.
         """
         ratios = ffi.new("float[]", lib.LEVER_TEST_RATIOS)
         lib.lever_test_ratios(self.pointer, ratios)
         return dict(zip(TEST_RATIOS, ratios, strict=True))
 
     def watch(self, aircraft: AircraftResponse | None) -> None:
-        """Watch the loop with this aircraft from now on; None: with none. Raise LeverError."""
+        """Watch the loop with this aircraft from now on.
+
+        Parameters
+        ----------
+        aircraft
+            How the cabin responds to the lever; None: watch no loop.
+
+        Raises
+        ------
+        LeverError
+            The firmware refuses the response.
+        """
         if not lib.lever_aircraft(self.pointer, ffi.NULL if aircraft is None else aircraft.pointer):
             raise LeverError(
                 "the firmware refused the response of the aircraft: frequencies must rise from above 0, sigmas lie "
@@ -220,18 +302,36 @@ class Estimator:
         self._aircraft = aircraft
 
     def stability(self) -> Stability:
-        """Return how near the loop is to collective bounce, as of the last publish_period."""
+        """Return how near the loop is to collective bounce, as of the last publish_period.
+
+        Returns
+        -------
+        Stability
+            Gain margin [dB], modulus [1] and frequency [Hz] with their standard deviations, and the state of the alarm.
+        """
         lib.lever_stability(self.pointer, self._stability)
         values = {name: getattr(self._stability, name) for name in Stability._fields}
         return Stability(**values | {"state": _BOUNCE[values["state"]]})
 
     def correction(self) -> Correction:
-        """Return what mitigation adds to the lever's angle, until the next sample."""
+        """Return what mitigation adds to the lever's angle, until the next sample.
+
+        Returns
+        -------
+        Correction
+            The angle [rad], and how much of the mitigation is faded in [1].
+        """
         lib.lever_correction(self.pointer, self._correction)
         return Correction(self._correction.angle, self._correction.weight)
 
     def health(self) -> Health:
-        """Mode, faults and counts after the last sample."""
+        """Return mode, faults and counts after the last sample.
+
+        Returns
+        -------
+        Health
+            Names for mode and faults; counts since the start.
+        """
         lib.lever_health(self.pointer, self._health)
         return health_of(self._health)
 
@@ -239,6 +339,11 @@ class Estimator:
         """Return all that its future depends on besides configuration, aircraft and what it is given.
 
         It is to be called between two samples.
+
+        Returns
+        -------
+        bytes
+            For restore(), in the layout of state_layout().
         """
         room = ffi.new("uint8_t[]", lib.LEVER_STATE_BYTES)
         lib.lever_state_save(self.pointer, room)
@@ -247,12 +352,38 @@ class Estimator:
     def restore(self, state: bytes) -> bool:
         """Go on from the state of an instance with the same settings.
 
-        Return False, and stay unchanged, for one that is of another kind.
+        Parameters
+        ----------
+        state
+            What state() has returned.
+
+        Returns
+        -------
+        bool
+            False, and unchanged, for a state of another kind.
         """
         return len(state) == lib.LEVER_STATE_BYTES and bool(lib.lever_state_restore(self.pointer, state))
 
     def on_frame(self, identifier: int, data: bytes | bytearray) -> int:
-        """Take a classic CAN frame (11-bit identifier, at most 8 bytes); FRAME_SAMPLE if it completes a sample."""
+        """Take a classic CAN frame.
+
+        Parameters
+        ----------
+        identifier
+            11 bits.
+        data
+            At most 8 bytes.
+
+        Returns
+        -------
+        int
+            FRAME_SAMPLE if the frame completes a sample, which step() then takes.
+
+        Raises
+        ------
+        LeverError
+            The frame is longer than 8 bytes.
+        """
         length = len(data)
         if length > 8:
             raise LeverError(f"frame {identifier:#x} has {length} bytes; a classic CAN frame has at most 8")
@@ -263,13 +394,24 @@ class Estimator:
         return lib.lever_on_frame(self.pointer, received)  # type: ignore[no-any-return]
 
     def step(self) -> int:
-        """Take the sample that on_frame() has completed; return the mode, a key of enum_names("lever_mode")."""
+        """Take the sample that on_frame() has completed.
+
+        Returns
+        -------
+        int
+            The mode, a key of enum_names("lever_mode").
+        """
         return lib.lever_step(self.pointer)  # type: ignore[no-any-return]
 
     def next_frame(self) -> tuple[int, bytes] | None:
-        """Return the next frame to send, as identifier and data; None when there is none left.
+        """Return the next frame to send.
 
-        Fetch them after every frame taken: a COMMAND is acknowledged, sample or not.
+        Fetch all of them after every frame taken: a COMMAND is acknowledged, sample or not.
+
+        Returns
+        -------
+        tuple of int and bytes, or None
+            Identifier and data; None when there is none left.
         """
         answer = self._answer
         if not lib.lever_next_frame(self.pointer, answer):
@@ -327,14 +469,28 @@ def run_samples(
 ) -> dict[str, NDArray[Any]]:
     """Feed N samples to a fresh estimator and return its estimates after each, or after those with the indices `at`.
 
-    samples: columns of N numbers (arrays, lists, of pandas, of polars): time_us [µs] (whole numbers, wrapped here),
-    theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s²], grip_force [N]; bool columns theta_valid … may say what
-    is valid, without them what is neither NaN nor null is. One that is missing is never valid. What is plainly in
-    another unit, such as milliseconds or degrees, is a LeverError.
+    Parameters
+    ----------
+    config
+        The estimator's configuration; None: the firmware's defaults.
+    samples
+        Columns of N numbers (arrays, lists, of pandas, of polars): time_us [µs] (whole numbers, wrapped here), theta
+        [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s²], grip_force [N]. Bool columns theta_valid … may say what is
+        valid; without them it is what is neither NaN nor null. A column that is missing is never valid.
+    at
+        Rising indices of the samples after which estimates are wanted; None: after each.
 
-    Returned: each field of lever_estimate_t in single precision (N by 3 for parameter, parameter_sigma,
-    parameter_correlation), mode and faults as the numbers of the façade's enums, and how often the filter was restarted
-    so far (recoveries).
+    Returns
+    -------
+    dict
+        Each field of lever_estimate_t in single precision (N by 3 for parameter, parameter_sigma and
+        parameter_correlation), mode and faults as the numbers of the façade's enums, and how often the filter was
+        restarted so far (recoveries).
+
+    Raises
+    ------
+    LeverError
+        Columns are missing, unknown or of unequal length, or plainly in another unit, such as milliseconds or degrees.
     """
     import numpy as np
 

@@ -23,9 +23,22 @@ LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
 
 
 def native_file(name: str) -> Path:
-    """Return the path of `name`, which installing has put into `_native`.
+    """Return the path of a file that installing has put into `_native`.
 
-    It is the shared library, its declarations, or lever.dbc.
+    Parameters
+    ----------
+    name
+        A shared library, its declarations, or "lever.dbc".
+
+    Returns
+    -------
+    Path
+        The first of that name in the folders of LEVER_CDKF_LIBRARY_DIR and of the package.
+
+    Raises
+    ------
+    LeverError
+        There is none: the package is not installed.
     """
     folders = [Path(folder) for folder in os.environ.get(LIBRARY_DIR, "").split(os.pathsep) if folder]
     folders += [Path(folder) / "_native" for folder in lever_cdkf.__path__]  # two, if the install is editable

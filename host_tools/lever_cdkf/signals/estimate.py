@@ -29,17 +29,30 @@ def estimate(
 ) -> Result:
     """Return the pilot's parameters, with their standard deviations, from recorded samples.
 
-    samples: a frame of pandas or polars, a Dataset of xarray, or a mapping of arrays, with the columns time [s], theta
-    [rad], theta_dot [rad/s], z_ddot [m/s²], tau_m [N m], grip_force [N]; z_ddot and one of theta and theta_dot are
-    needed. NaN and null are missing. Time may be an index or coordinate, and dates.
+    Parameters
+    ----------
+    samples
+        A frame of pandas or polars, a Dataset of xarray, or a mapping of arrays, with the columns time [s], theta
+        [rad], theta_dot [rad/s], z_ddot [m/s²], tau_m [N m], grip_force [N]; z_ddot and one of theta and theta_dot are
+        needed. NaN and null are missing. Time may be an index or coordinate, and dates. Gravity in z_ddot is recognised
+        and subtracted.
+    config
+        The estimator's; its sample_period becomes that of the samples, unless it has one that is not the default.
+    units
+        Of columns that are not in SI, {"theta": "deg", "z_ddot": "g", "time": "ms"}. A unit in a column's name
+        (theta_deg, "theta [deg]") or in xarray's attribute `units` counts too.
+    names
+        Of columns that are called otherwise, {"theta": "LvrAngle"}.
 
-    units: where they are others, {"theta": "deg", "z_ddot": "g", "time": "ms"}. A unit in a column's name (theta_deg,
-    "theta [deg]") or in xarray's attribute `units` counts too. What is plainly in another unit than is said, or than SI
-    where none is said, is a LeverError that names it. Gravity in z_ddot is recognised and subtracted.
+    Returns
+    -------
+    Result
+        All estimates at each sample, named, with units and standard deviations.
 
-    names: columns that are called otherwise, {"theta": "LvrAngle"}.
-
-    config: the estimator's; its sample_period becomes that of the samples, unless it has one that is not the default.
+    Raises
+    ------
+    LeverError
+        An input is missing, or plainly in another unit than is said, or than SI where none is said; it is named.
     """
     columns = columns_of(samples)
     for key, name in (names or {}).items():

@@ -58,7 +58,19 @@ class Estimated:
 
 
 class Result(Mapping[str, Estimated]):
-    """The estimates by name: result["natural_frequency"].last, .sigma, .unit. They are NaN until the estimator runs."""
+    """The estimates by name: result["natural_frequency"].last, .sigma, .unit. They are NaN until the estimator runs.
+
+    Parameters
+    ----------
+    config
+        The configuration of the estimator.
+    time_us
+        Time of each sample [µs].
+    raw
+        What run_samples() has returned.
+    notes
+        What was understood of the samples that they do not say.
+    """
 
     def __init__(
         self, config: Config, time_us: IntArray, raw: Mapping[str, NDArray[Any]], notes: tuple[str, ...]
@@ -112,7 +124,13 @@ class Result(Mapping[str, Estimated]):
         return _as_text(self._raw["faults"], lambda bits: ", ".join(fault_names(bits)))
 
     def columns(self) -> dict[str, tuple[NDArray[Any], str]]:
-        """Return values and unit by name, as to_parquet() writes them."""
+        """Return all columns, as to_parquet() writes them.
+
+        Returns
+        -------
+        dict
+            Values and unit ("1" without one, "" of text) by name.
+        """
         table: dict[str, tuple[NDArray[Any], str]] = {"time": (self.time, "s")}
         for each in self._estimated.values():
             table[each.name], table[f"{each.name}_sigma"] = (each.values, each.unit), (each.sigma, each.unit)
@@ -121,7 +139,15 @@ class Result(Mapping[str, Estimated]):
     def to_parquet(self, path: str | Path) -> None:
         """Write columns() with the units as metadata of the fields, and provenance as metadata of the file.
 
-        Raise LeverError.
+        Parameters
+        ----------
+        path
+            Where to write the file; it is there whole, or not at all.
+
+        Raises
+        ------
+        LeverError
+            The extra `files` is not installed, or the file cannot be written.
         """
         require("files")
         import pyarrow
@@ -142,10 +168,23 @@ class Result(Mapping[str, Estimated]):
     def plot(self, path: str | Path | None = None, *, width: str = "double") -> Any:
         """Return the parameters, natural frequency and damping ratio over time with their bands of ±2 sigma.
 
-        They are a Figure of matplotlib, as wide as one ("single", 88 mm) or two ("double", 180 mm) columns of a
-        journal.
+        Parameters
+        ----------
+        path
+            Where to keep it (.pdf, .svg or .png), with what it shows beside it as CSV; None: nowhere.
+        width
+            As wide as one ("single", 88 mm) or two ("double", 180 mm) columns of a journal.
 
-        path: where to keep it (.pdf, .svg or .png), with what it shows beside it as CSV. Raise LeverError.
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A chart for each quantity, over time [s].
+
+        Raises
+        ------
+        LeverError
+            The extra `study` is not installed, the width or the ending of the path is another, or a file cannot be
+            written.
         """
         require("study")
         from ..exports import pictures

@@ -59,13 +59,42 @@ def simulate(
 ) -> SimulationResult:
     """Run `scenario` against the estimator on `bus`, or without one against the firmware in this process, and judge it.
 
-    With `out_dir` also write bus.log, the signals in `formats` (formats.FORMATS), report.html (with the extra `report`)
-    and summary.json there, all or none. `channel` is the bus's name in bus.log; `inputs` are files that the scenario is
-    from; `story` makes a first picture for the report; in this process the firmware sends its state each `snapshots`
-    seconds.
+    The run and its files, but for wall times, are the same at any pace.
 
-    `realtime` paces the samples by the wall clock, otherwise they come as fast as they are answered. The run and its
-    files but for the wall times are the same either way. Raise LeverError.
+    Parameters
+    ----------
+    scenario
+        What load_scenario() has returned.
+    bus
+        A bus of python-can with an estimator on it; None: the firmware in this process.
+    out_dir
+        The folder for bus.log, the signals, report.html (with the extra `report`) and summary.json, all or none; None:
+        no files.
+    channel
+        The name of the bus in bus.log.
+    realtime
+        Pace the samples by the wall clock; otherwise they come as fast as they are answered.
+    progress
+        Is told how far it is.
+    formats
+        Of the signals: keys of formats.FORMATS.
+    inputs
+        Files that the scenario is from.
+    story
+        Makes a first picture for the report.
+    snapshots
+        How often the firmware in this process sends its state [s]; None: never.
+
+    Returns
+    -------
+    SimulationResult
+        The trace with a column for each signal, the judgement, and every frame.
+
+    Raises
+    ------
+    LeverError
+        The estimator does not answer or refuses a COMMAND, the motion grows beyond all bounds, or a file cannot be
+        written.
     """
     start = clock.perf_counter()
     if out_dir is not None:

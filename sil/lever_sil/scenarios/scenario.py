@@ -260,9 +260,24 @@ names = SHELF.names
 
 
 def load(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Scenario:
-    """Return the scenario of that name, or in the file of that path (ending in .toml); raise ScenarioError.
+    """Return a scenario, checked.
 
-    `overrides` are "key.subkey=value".
+    Parameters
+    ----------
+    name_or_path
+        A name of `lever sim --list`, or the path of a file that ends in .toml.
+    overrides
+        Changes to it, each "key.subkey=value" with the unit in the value, as "duration=20 s".
+
+    Returns
+    -------
+    Scenario
+        For simulate().
+
+    Raises
+    ------
+    ScenarioError
+        There is no such scenario, or something in it is wrong; one line names it.
     """
     if not isinstance(name_or_path, (str, os.PathLike)):
         raise ScenarioError(f"{name_or_path!r} is no scenario: give its name, or the path of a .toml file")

@@ -54,7 +54,22 @@ class Config:
     """First guess of the parameters, its standard deviation, their random walk; noise of outputs and process."""
 
     def move(self, x: Array, p: Array, before: Sample, after: Sample) -> Array:
-        """Return the states (2,) at sample `after` of states x (2,) at `before`, both as in Sample; p (3,) physical."""
+        """Return the states at a sample, of those at the sample before.
+
+        Parameters
+        ----------
+        x
+            The states (2,) at `before`: theta [rad] and theta_dot [rad/s], as in Sample.
+        p
+            The parameters (3,) in physical units.
+        before, after
+            The two samples.
+
+        Returns
+        -------
+        array
+            The states (2,) at `after`.
+        """
         u = (0.5 * (before.z_ddot + after.z_ddot), 0.5 * (before.tau_m + after.tau_m))
         rest = np.array((before.trim, 0.0))
         moved: Array = self.model.step(x + rest, p, u, before.trim, self.period) - rest
@@ -65,13 +80,31 @@ class Candidate(Protocol):
     """The three methods."""
 
     def start(self, config: Config) -> None:
-        """Begin a run."""
+        """Begin a run.
+
+        Parameters
+        ----------
+        config
+            What is known before the first sample.
+        """
 
     def step(self, sample: Sample) -> None:
-        """Take the next sample."""
+        """Take the next sample.
+
+        Parameters
+        ----------
+        sample
+            What the sensors say.
+        """
 
     def estimate(self) -> tuple[Array, Array | None]:
-        """Return the parameters (3,) in physical units, and their covariance (3, 3) or None if it has none to state."""
+        """Return the estimate after the last sample.
+
+        Returns
+        -------
+        tuple of array and (array or None)
+            The parameters (3,) in physical units, and their covariance (3, 3); None if it has none to state.
+        """
 
 
 def candidate(name: str) -> Estimator:

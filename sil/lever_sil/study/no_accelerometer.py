@@ -185,7 +185,20 @@ def firmware(y: Array, truth: Array) -> tuple[Found, Array]:
 
 
 def rows(count: int = SEEDS, duration: float = DURATION) -> list[Row]:
-    """Return the table of PAPER.md: a row for each base and assumption, and one for the firmware of each base."""
+    """Return the table of PAPER.md.
+
+    Parameters
+    ----------
+    count
+        Pilots.
+    duration
+        Of each run [s].
+
+    Returns
+    -------
+    list of dict
+        A row for each base and assumption, and one for the firmware of each base.
+    """
     table: list[Row] = []
     for base in BASES:
         y, _, truth = runs(base, count, duration)
