@@ -128,7 +128,7 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
             correction.bounded = cdkf_learn_step(cdkf, &step);
         }
         if (evidence_of_change(&learning->evidence, &correction, block)) {
-            evidence_begin_change(&learning->evidence, block->known, false);
+            evidence_follow_change(&learning->evidence, block);
             walk = block->known ? turn(learning, setup, cdkf, verdict_of(learning->evidence.present))
                                 : disturb_unknown(learning, setup->settings, cdkf);
         }

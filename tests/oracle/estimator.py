@@ -146,9 +146,8 @@ class Estimator:
         inputs_back = False
         for i in range(1, substeps + 1):
             if i == substeps:
-                inputs_back = (base_valid and self.base_missing > OUTAGE) or (
-                    torque_valid and self.torque_missing > OUTAGE
-                )
+                base_back = base_valid and self.base_missing > OUTAGE
+                inputs_back = bool(base_back or (torque_valid and self.torque_missing > OUTAGE))
                 self.base_missing = seconds(0.0) if base_valid else self.base_missing + counted(duration)
                 self.torque_missing = seconds(0.0) if torque_valid else self.torque_missing + counted(duration)
                 if inputs_back:
