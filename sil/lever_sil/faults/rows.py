@@ -414,7 +414,7 @@ KNOWN: dict[str, str] = {
     "theta_invalid_from_power_on": _RATE_ALONE,
     "theta_saturated_from_power_on": _RATE_ALONE,
     "theta_drift_frozen": _TRIM,
-    "theta_dot_gain_half": "angle and rate tell within half a second; until then some pilots' arm is off by over 3 sigma",
+    "theta_dot_gain_half": "angle and rate tell in half a second; until then some arms are off by over 3 sigma",
     "theta_dot_gain_double": _LEVELS,
     "tau_m_stuck": _TORQUE,
     "tau_m_zero": _TORQUE,
