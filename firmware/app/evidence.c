@@ -381,16 +381,15 @@ bool evidence_of_change(evidence_t *evidence, const correction_t *correction, co
 void evidence_begin_change(evidence_t *evidence, bool known, bool opened)
 {
     const bool again = known && (evidence->since_change < TRANSIENT);
-    evidence->changes = (uint8_t)lesser_count(again ? ((uint32_t)evidence->changes + 1u) : 1u, CHANGES_MAX);
+    evidence->changes = again ? (evidence->changes + 1u) : 1u;
     evidence->since_change = known ? 0.0f : PROBATION;
     evidence->opened = opened;
     evidence_note(evidence, EVIDENCE_REGRIP, known);
 }
 
-void evidence_follow_change(evidence_t *evidence, const evidence_block_t *block)
+void evidence_doubt_change(evidence_t *evidence)
 {
-    evidence_begin_change(evidence, block->known, false);
-    if ((evidence->changes >= CHANGES_MAX) && (block->setup->settings->noise_window > 0.0f)) {
+    if (evidence->changes >= CHANGES_MAX) {
         evidence->since_change = EVIDENCE_LONG_AGO; /* it is none */
         evidence_note(evidence, EVIDENCE_NOISE, true);
     }

@@ -64,7 +64,8 @@ typedef struct evidence {
     float ratio[LEVER_TEST_RATIOS]; /* statistic over threshold, of those that are no states */
     uint32_t present;               /* a bit each */
     uint32_t faults;                /* of enum lever_fault, that it shows as at the end of a block */
-    float since_change;             /* time since the pilot changed last [s] */
+    uint32_t changes;               /* of the pilot in a row, the last one included */
+    float since_change;             /* time since that [s] */
     float nis_fast;                 /* mean of nis / nis_size over 0.1 s; expected 1, */
     float nis_slow;                 /* and over excitation_time */
     motion_t motion;
@@ -88,7 +89,6 @@ typedef struct evidence {
     bool seen[SIGNAL_COUNT]; /* in this block */
     bool paired;             /* the last sample measured both outputs */
     bool opened;             /* the last change was to another pilot */
-    uint8_t changes;         /* in a row, the last one included */
 } evidence_t;
 
 #define EVIDENCE_NOISE_LIKE_MOTION 0.2f /* of the noise of theta_dot, in squares: a mean of products by chance */
@@ -191,9 +191,9 @@ bool evidence_of_change(evidence_t *evidence, const correction_t *correction, co
 /* The pilot changed just now; `opened`: to another one. An arm that is not known yet does not grip anew. */
 void evidence_begin_change(evidence_t *evidence, bool known, bool opened);
 
-/* The arm has changed, as evidence_of_change() says. The third change in a row explains no more than those before it:
- * noise has grown, where that is estimated. */
-void evidence_follow_change(evidence_t *evidence, const evidence_block_t *block);
+/* After a change, where noise is estimated. The third in a row explains no more than those before it: it is none, and
+ * noise has grown. */
+void evidence_doubt_change(evidence_t *evidence);
 
 /* How much torque the lever is moved by that nobody knows, 0 to 1: as far as innovations are larger than expected. */
 float evidence_of_torque(const evidence_t *evidence);

@@ -128,7 +128,10 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
             correction.bounded = cdkf_learn_step(cdkf, &step);
         }
         if (evidence_of_change(&learning->evidence, &correction, block)) {
-            evidence_follow_change(&learning->evidence, block);
+            evidence_begin_change(&learning->evidence, block->known, false);
+            if (setup->settings->noise_window > 0.0f) {
+                evidence_doubt_change(&learning->evidence);
+            }
             walk = block->known ? turn(learning, setup, cdkf, verdict_of(learning->evidence.present))
                                 : disturb_unknown(learning, setup->settings, cdkf);
         }
