@@ -64,8 +64,7 @@ typedef struct evidence {
     float ratio[LEVER_TEST_RATIOS]; /* statistic over threshold, of those that are no states */
     uint32_t present;               /* a bit each */
     uint32_t faults;                /* of enum lever_fault, that it shows as at the end of a block */
-    uint32_t changes;               /* of the pilot in a row, the last one included */
-    float since_change;             /* time since that [s] */
+    float since_change;             /* time since the pilot changed last [s] */
     float nis_fast;                 /* mean of nis / nis_size over 0.1 s; expected 1, */
     float nis_slow;                 /* and over excitation_time */
     motion_t motion;
@@ -89,6 +88,7 @@ typedef struct evidence {
     bool seen[SIGNAL_COUNT]; /* in this block */
     bool paired;             /* the last sample measured both outputs */
     bool opened;             /* the last change was to another pilot */
+    uint32_t changes;        /* of the pilot in a row, the last one included */
 } evidence_t;
 
 #define EVIDENCE_NOISE_LIKE_MOTION 0.2f /* of the noise of theta_dot, in squares: a mean of products by chance */
