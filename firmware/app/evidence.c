@@ -38,7 +38,6 @@
 #define PROBATION 0.29f         /* until then a change has to explain the innovations [s] [rough_begins] */
 #define EXPLAINED 0.6f          /* and leave no more of EVIDENCE_NOISE at its end */
 #define TRANSIENT 1.0f          /* innovations are noise again, and not of the change [s] */
-#define CHANGES_MAX 3u          /* in a row, each within TRANSIENT of the last [z_ddot_gain_double] */
 #define CHANGE_WAITS 0.6f       /* of EVIDENCE_BASE from which on the sensor is to be judged before a change */
 #define HELD 0.043f             /* EVIDENCE_HANDS above which nobody may hold the lever any more */
 #define TORQUE_UNKNOWN 1.2f     /* nis_fast at a change from which on torque is thought to have changed, too, */
@@ -380,19 +379,9 @@ bool evidence_of_change(evidence_t *evidence, const correction_t *correction, co
 
 void evidence_begin_change(evidence_t *evidence, bool known, bool opened)
 {
-    const bool again = known && (evidence->since_change < TRANSIENT);
-    evidence->changes = again ? (evidence->changes + 1u) : 1u;
     evidence->since_change = known ? 0.0f : PROBATION;
     evidence->opened = opened;
     evidence_note(evidence, EVIDENCE_REGRIP, known);
-}
-
-void evidence_doubt_change(evidence_t *evidence)
-{
-    if (evidence->changes >= CHANGES_MAX) {
-        evidence->since_change = EVIDENCE_LONG_AGO; /* it is none */
-        evidence_note(evidence, EVIDENCE_NOISE, true);
-    }
 }
 
 float evidence_of_torque(const evidence_t *evidence)

@@ -88,7 +88,6 @@ typedef struct evidence {
     bool seen[SIGNAL_COUNT]; /* in this block */
     bool paired;             /* the last sample measured both outputs */
     bool opened;             /* the last change was to another pilot */
-    uint32_t changes;        /* of the pilot in a row, the last one included */
 } evidence_t;
 
 #define EVIDENCE_NOISE_LIKE_MOTION 0.2f /* of the noise of theta_dot, in squares: a mean of products by chance */
@@ -190,10 +189,6 @@ bool evidence_of_change(evidence_t *evidence, const correction_t *correction, co
 
 /* The pilot changed just now; `opened`: to another one. An arm that is not known yet does not grip anew. */
 void evidence_begin_change(evidence_t *evidence, bool known, bool opened);
-
-/* After a change, where noise is estimated. The third in a row explains no more than those before it: it is none, and
- * noise has grown. */
-void evidence_doubt_change(evidence_t *evidence);
 
 /* How much torque the lever is moved by that nobody knows, 0 to 1: as far as innovations are larger than expected. */
 float evidence_of_torque(const evidence_t *evidence);

@@ -129,9 +129,6 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
         }
         if (evidence_of_change(&learning->evidence, &correction, block)) {
             evidence_begin_change(&learning->evidence, block->known, false);
-            if (setup->settings->noise_window > 0.0f) {
-                evidence_doubt_change(&learning->evidence);
-            }
             walk = block->known ? turn(learning, setup, cdkf, verdict_of(learning->evidence.present))
                                 : disturb_unknown(learning, setup->settings, cdkf);
         }

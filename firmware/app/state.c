@@ -55,7 +55,6 @@ static const state_row_t rows[] = {
     FLOATS(estimator.learning.evidence.force.raw, estimator.learning.evidence.force.means.time),
     FLAGS(estimator.learning.evidence.force.seen, estimator.learning.evidence.force.wrong),
     FLAGS(estimator.learning.evidence.seen[0], estimator.learning.evidence.opened),
-    WORDS(estimator.learning.evidence.changes, estimator.learning.evidence.changes),
     FLOATS(estimator.learning.noise.elapsed, estimator.learning.elapsed),
     BYTES(estimator.learning.verdict, estimator.learning.verdict, (uint32_t)VERDICT_COUNT - 1u),
     FLAGS(estimator.learning.levels, estimator.learning.levels),

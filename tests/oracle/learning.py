@@ -31,7 +31,6 @@ DISTURBANCE = 2.0  # process noise after a change, in noise_range times the one 
 DISTURBANCE_TIME = 0.4  # [s] in which it dies away
 GRIP = 0.038  # [s] until a new grip is complete
 STEP_SIGMA = 100.0  # [rad/s²], of a step that nothing is known of
-MOST_CHANGES = 3  # in a row, each within TRANSIENT of the last: that many explain nothing
 SURPRISES = (1.2, 2.0)  # at a change: from which on there is any of it, and at which it is as large as can be
 
 
@@ -91,7 +90,6 @@ class Learning:
         self.elapsed = 0.0  # since the parameters learnt last [s]
         self.counted = seconds(0.0)  # the same
         self.since_change, self.awake = seconds(LONG_AGO), seconds(0.0)
-        self.changes = 0  # in a row, the last one included
         self.verdict = "rest"
         self.explains = False  # innovations tell from now on whether a change explains them
         self.moved = False  # a new grip is complete, and has moved the lever
@@ -206,12 +204,7 @@ class Learning:
 
     def _follow(self, lesson: Lesson) -> float:
         """Follow a change: a known arm grips anew; of an unknown one, torque is unknown. Return seconds of the walk."""
-        known = self.kept[1].trust >= 1.0
-        self.changes = self.changes + 1 if known and self.since_change < TRANSIENT else 1
-        if known and self.changes >= MOST_CHANGES and self.settings["noise_window"] > 0.0:
-            self.since_change = seconds(LONG_AGO)  # it is no change
-            return self._turn("noise", lesson)
-        if known:
+        if self.kept[1].trust >= 1.0:
             self.since_change = seconds(0.0)
             return self._turn("regrip", lesson)
         self.since_change = seconds(PROBATION)

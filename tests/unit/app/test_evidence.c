@@ -513,31 +513,6 @@ TEST(angle_and_rate_are_compared_from_sample_to_sample_only)
     }
 }
 
-/* --- changes in a row --------------------------------------------------------------------------------------------- */
-
-/* Changes `apart` seconds from each other. Returns which of them is noise that has grown; 0: none. */
-static uint32_t grown_at(uint32_t changes, float apart, bool known)
-{
-    uint32_t grown = 0u;
-    evidence_start(&evidence);
-    for (uint32_t k = 1u; (k <= changes) && (grown == 0u); k++) {
-        evidence.since_change = (k == 1u) ? evidence.since_change : apart;
-        evidence_begin_change(&evidence, known, false);
-        evidence_doubt_change(&evidence);
-        grown = evidence_has(&evidence, EVIDENCE_NOISE) ? k : 0u;
-    }
-    return grown;
-}
-
-/* R58 */
-TEST(the_third_change_in_a_row_is_noise_that_has_grown)
-{
-    TEST_ASSERT_EQUAL_UINT32(3u, grown_at(5u, 0.99f, true));
-    TEST_ASSERT_EQUAL_FLOAT(EVIDENCE_LONG_AGO, evidence.since_change); /* it was none */
-    TEST_ASSERT_EQUAL_UINT32(0u, grown_at(5u, 1.01f, true));
-    TEST_ASSERT_EQUAL_UINT32(0u, grown_at(5u, 0.5f, false)); /* of an arm that is not known yet */
-}
-
 TEST(it_starts_long_after_a_change_and_without_a_ratio_that_nothing_is_known_of)
 {
     TEST_ASSERT_EQUAL_FLOAT(EVIDENCE_LONG_AGO, evidence.since_change);
