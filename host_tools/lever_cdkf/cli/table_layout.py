@@ -13,7 +13,7 @@ from rich.text import Text
 
 from .layout import words, wrapped
 
-PROSE = 32
+_PROSE = 32
 """Wider text is prose, which is folded, to no less than this, or stands beneath its row."""
 _HEADING_LINES = 3
 _INDENT = "    "
@@ -35,7 +35,12 @@ class Column:
         if folded:
             name = max([-(-name // _HEADING_LINES), *map(cell_len, words(self.name))])
         whole = [word for cell in self.cells for word in words(cell)] if self.is_prose else self.cells
-        return max([name, PROSE if self.is_prose else 0, *map(cell_len, whole)])
+        return max([name, _PROSE if self.is_prose else 0, *map(cell_len, whole)])
+
+
+def is_prose(cells: Sequence[str]) -> bool:
+    """Return whether texts are so wide that they are better folded, or stand beneath their rows."""
+    return max(map(cell_len, cells)) > _PROSE
 
 
 def table_lines(columns: Sequence[Column], width: int) -> list[str]:
@@ -75,7 +80,7 @@ def upright_lines(columns: Sequence[Column], width: int) -> list[str]:
         values.append(
             f"{column.cells[0]} {unit}" if column.cells[0] and unit not in ("", "1") else column.cells[0] or "-"
         )
-    both = [Column("", names, False, False), Column("", values, False, max(map(cell_len, values)) > PROSE)]
+    both = [Column("", names, False, False), Column("", values, False, is_prose(values))]
     return _drawn(both, width)[2:]
 
 

@@ -54,15 +54,13 @@ def print_tables(
 
 
 def _columns(rows: Sequence[Row], digits: int) -> list[Column]:
-    from .table_layout import PROSE, Column
+    from .table_layout import Column, is_prose
 
     columns: list[Column] = []
     for name in rows[0]:
         cells = [_text(row[name], digits) for row in rows]
         is_number = all(_is_number(row[name]) or row[name] is None for row in rows)
-        columns.append(
-            Column(name, cells, is_number, bool(columns) and not is_number and len(max(cells, key=len)) > PROSE)
-        )
+        columns.append(Column(name, cells, is_number, bool(columns) and not is_number and is_prose(cells)))
     return columns
 
 

@@ -22,7 +22,7 @@ from .recorded import Signal
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _STRETCHES = 600
-"""Of time: a chart shows the range of the values in each."""
+"""A chart shows the range of the values in each of so many stretches of time."""
 _GAP = 10.0
 """Mean steps of time over which no line is drawn."""
 _PIXELS, _INCHES = 120, 1.2
@@ -68,10 +68,11 @@ def write(path: Path, signals: Sequence[tuple[str, Signal]], title: str, origin:
 
 def _page(signals: Sequence[tuple[str, Signal]], title: str) -> str:
     page = Page(title, "The range of the values of each signal, over time.", "lever map")
+    extent = _extent(signals)
     inputs, others = ([each for each in signals if bool(each[0]) is headed] for headed in (True, False))
     for key, name, part in (("inputs", "Inputs", inputs), ("others", "Other signals", others)):
         if part:
-            page.section(key, name, name, page.figure(f"figure-{key}", _figure(part, *_extent(signals)), ""))
+            page.section(key, name, name, page.figure(f"figure-{key}", _figure(part, *extent), ""))
     return page.html("")
 
 

@@ -36,12 +36,12 @@ def noise(rms: float, low: float = 1.0, high: float = 10.0) -> Excitations:
 
 
 BASE, DITHER = noise(1.0), noise(0.3)
-"""Of steady flight [m/s^2, N m]."""
+"""The base acceleration [m/s^2] and the motor torque [N m] of steady flight."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What acts on a lever and the random pilot who holds it.
+    """A lever is moved by these, and held by a random pilot.
 
     Equal motions are simulated once, whatever the sensors make of them.
     """
@@ -49,9 +49,9 @@ class Motion:
     duration: float = 60.0
     """[s]"""
     base: Excitations = BASE
-    """z_ddot [m/s^2]."""
+    """The base acceleration z_ddot [m/s^2]."""
     torque: Excitations = DITHER
-    """Of the motor [N m]."""
+    """The torque of the motor [N m]."""
     disturbance: Excitations = ()
     """Unmeasured torque [N m]."""
     process_noise: float = 0.05

@@ -1,4 +1,4 @@
-"""What users import says its parameters, what it returns and what it raises, in the sections of numpydoc."""
+"""The docstrings of all that users import have the sections Parameters, Returns and Raises of numpydoc."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from lever_sil.study import candidate
 
 SECTIONS = ("Parameters", "Returns", "Yields", "Raises")
 INTERFACES = (candidate.Candidate, candidate.Config)
-"""What users implement, and are given."""
+"""Users implement the one, and are given the other."""
 
 
 def code_of(root: Path) -> Iterator[str]:
