@@ -66,8 +66,7 @@ def fill(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> No
 def _columns(struct: Struct, plant: Any, truth: Truth, conditions: Conditions) -> _Columns:
     """Return the coefficients; put what else there is of a kind into the plant."""
     if isinstance(truth, linear_plant.LinearTruth):
-        system = truth.system
-        return system.stiffness, system.damping, system.gain, system.compliance, system.rest
+        return tuple(vars(truth.system).values())
     if isinstance(truth, lever_plant.LeverTruth):
         _fill_lever(plant.lever, truth.lever, truth.preload)
         return lever_plant.coefficients(truth.lever, truth.pilot, truth.preload)

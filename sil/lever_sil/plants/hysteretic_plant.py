@@ -19,7 +19,6 @@ dynamics are those of the dominant mode of theta/z_ddot.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +27,7 @@ from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from . import lever_plant
-from .truth import Conditions, Dynamics, Truth, dominant_dynamics
+from .truth import Body, Conditions, ManyModes
 
 REFERENCE = 4.0
 """Where k_p is the stiffness [Hz]."""
@@ -61,10 +60,11 @@ class Power:
 
 
 @dataclass(frozen=True)
-class Hysteretic(Truth):
-    """The lever, and the pilot at every sample: arrays of equal length [kg, N/m, rad]."""
+class Hysteretic(ManyModes):
+    """The lever, and the pilot at every sample: arrays of equal length [kg, N/m at 4 Hz, rad]."""
 
     model = "hysteretic"
+    names = ("m_p", "k_p")
     lever: lever_plant.Lever
     loss_factor: float
     """[1]"""
@@ -73,25 +73,10 @@ class Hysteretic(Truth):
     trim: FloatArray
 
     @property
-    def parameters(self) -> Mapping[str, FloatArray]:
-        """m_p [kg] and k_p [N/m] at 4 Hz; the loss factor is constant."""
-        return {"m_p": self.m_p, "k_p": self.k_p}
-
-    @property
     def arm(self) -> lever_plant.Truth:
         """The spring and the damper without the elements."""
         power = Power.of(self.loss_factor)
         return lever_plant.Truth(self.m_p, power.damper * self.k_p, power.spring * self.k_p, self.trim)
-
-    @property
-    def rest(self) -> FloatArray:
-        """The trim angle [rad]."""
-        return self.trim
-
-    @property
-    def dynamics(self) -> Dynamics:
-        """Natural frequency [Hz] and damping ratio of the dominant mode."""
-        return dominant_dynamics(self, self.m_p, self.k_p, self.trim)
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
         """Return that of the spring and the damper, with the elements in its denominator."""
@@ -137,33 +122,16 @@ class Elements:
         return cls(until_middle, decay, power.springs * (1.0 - decay) / _RATES, damper)
 
 
-# One sample period, prepared: coefficients(), [(z_ddot, impulse), ...] of its substeps
-_Row = tuple[float, float, float, float, float, list[list[float]]]
-
-
-def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_Row]:
-    """Yield the sample periods between the samples, in order."""
-    for block in conditions.blocks():
-        at = block.periods
-        drive = np.stack((block.z_ddot, columns[0][at, None] * block.kick + block.push), axis=2).tolist()
-        yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
-
-
-class HystereticPlant:
+class HystereticPlant(Body):
     """Lever, arm and motor: a truth.Body."""
 
     def __init__(self, truth: Hysteretic, conditions: Conditions) -> None:
-        self.theta = float(truth.trim[0])
-        self.theta_dot = 0.0
-        self.tau_m = 0.0
-        self.grip_force = math.nan
+        super().__init__(float(truth.trim[0]), conditions)
         self._lever, self._power = truth.lever, Power.of(truth.loss_factor)
-        self._step = conditions.step
-        self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
         self._forces = np.zeros(len(_RATES))  # of the elements, for a stiffness of 1 [m]
         self._rest_sine = math.sin(self.theta)
         self._elements = Elements.of(self._power, self._step)
-        self._rows = _rows(coefficients(truth), conditions)
+        self._rows = conditions.rows(coefficients(truth))
 
     def advance(self, command: float) -> None:
         """To the next sample, with the torque `command` [N m] held. Raise StopIteration after the last sample."""
@@ -173,7 +141,7 @@ class HystereticPlant:
         length, half = lever.lever_length, 0.5 * step
         forces = self._forces - power.springs * (length * (rest_sine - self._rest_sine))
         elements = self._elements
-        for acceleration, impulse in drive:
+        for acceleration, kick, push in drive:
             middle = theta + half * theta_dot
             rise = length * math.cos(middle)
             resisting, slope = lever_plant.resistance(lever, theta_dot)
@@ -181,6 +149,7 @@ class HystereticPlant:
             arm += elements.damper * rise * theta_dot
             force = command + torque * self._lag_middle - rise / length * moment * acceleration - rise * k_p * arm
             force -= lever.lever_stiffness * (middle - rest) + resisting
+            impulse = mass * kick + push
             change = (step * force + impulse) / (mass + half * (k_p * elements.damper * rise * rise + slope))
             forces = elements.decay * forces + elements.stretched * (rise * (theta_dot + 0.5 * change))
             theta += step * (theta_dot + 0.5 * change)

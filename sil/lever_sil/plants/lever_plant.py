@@ -20,7 +20,7 @@ its command with the motor's lag.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -31,7 +31,7 @@ from lever_cdkf.text.units import GRAVITY
 from numpy.typing import NDArray
 
 from . import truth as truths
-from .truth import Conditions, Dynamics
+from .truth import Body, Conditions, Dynamics
 
 Preload = Literal["fixed", "trim"]
 
@@ -216,19 +216,7 @@ def coefficients(lever: Lever, truth: Truth, kind: Preload) -> tuple[FloatArray,
     return inertia(lever, truth), moment(lever, truth), arm * truth.c_p, arm * truth.k_p, hold, lever_angle
 
 
-# One sample period, prepared: coefficients(), [(z_ddot, kick, push), ...]
-_Row = tuple[float, float, float, float, float, float, list[list[float]]]
-
-
-def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_Row]:
-    """Yield the sample periods between the samples, in order."""
-    for block in conditions.blocks():
-        at = block.periods
-        drive = np.stack((block.z_ddot, columns[0][at, None] * block.kick, block.push), axis=2).tolist()
-        yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
-
-
-class LeverPlant:
+class LeverPlant(Body):
     """Lever, arm and motor: a truth.Body, which starts at rest at the equilibrium.
 
     The grip force is what the lever's own equation of motion, over the last period, leaves to the hand; process noise
@@ -236,15 +224,11 @@ class LeverPlant:
     """
 
     def __init__(self, lever: Lever, truth: Truth, kind: Preload, conditions: Conditions) -> None:
-        self.theta = float(equilibrium(lever, truth, kind)[0])
-        self.theta_dot = 0.0
-        self.tau_m = 0.0
+        super().__init__(float(equilibrium(lever, truth, kind)[0]), conditions)
         self.grip_force = 0.0
         self._weight = weight(kind)
         self._lever = lever
-        self._step = conditions.step
-        self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
-        self._rows = _rows(coefficients(lever, truth, kind), conditions)
+        self._rows = conditions.rows(coefficients(lever, truth, kind))
 
     def advance(self, command: float, reflex: float = 0.0) -> None:
         """Go to the next sample, with the torque `command` and one of the arm [N m] held.
@@ -252,7 +236,8 @@ class LeverPlant:
         Raise StopIteration after the last sample.
         """
         theta, theta_dot, torque = self.theta, self.theta_dot, self.tau_m - command
-        mass, moment, arm_damping, arm_stiffness, hold, lever_angle, drive = next(self._rows)
+        mass, moment, arm_damping, arm_stiffness, hold, lever_angle, substeps = next(self._rows)
+        drive = [(acceleration, mass * kick, push) for acceleration, kick, push in substeps]
         lever, step, lag_middle, lag = self._lever, self._step, self._lag_middle, self._lag
         own_stiffness, held = lever.lever_stiffness, command + reflex
         sin, cos = math.sin, math.cos
@@ -281,7 +266,7 @@ class LeverPlant:
         self.grip_force = self._force_on_lever(begin, begin_dot, drive, lever_angle, command + motors / len(drive))
 
     def _force_on_lever(
-        self, begin: float, begin_dot: float, drive: list[list[float]], lever_angle: float, motor: float
+        self, begin: float, begin_dot: float, drive: list[tuple[float, float, float]], lever_angle: float, motor: float
     ) -> float:
         """Return the mean force of the hand [N] since the lever was at `begin` with the rate `begin_dot`.
 

@@ -14,9 +14,7 @@ theta_dot.
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +22,7 @@ from lever_cdkf.models.transfer import Transfer
 from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
-from .truth import Conditions, Dynamics, Truth
+from .truth import Body, Conditions, Dynamics, Truth
 
 
 @dataclass(frozen=True)
@@ -82,15 +80,11 @@ class Physical(LinearTruth):
     """Mass [kg], damper [N s/m] and spring [N/m] on the base, theta taken for metres and tau_m for newtons."""
 
     model = "linear_physical"
+    names = ("m", "c", "k")
     m: FloatArray
     c: FloatArray
     k: FloatArray
     trim: FloatArray
-
-    @property
-    def parameters(self) -> Mapping[str, FloatArray]:
-        """m, c and k of the mass on spring and damper, in SI units."""
-        return {"m": self.m, "c": self.c, "k": self.k}
 
     @property
     def system(self) -> System:
@@ -104,15 +98,11 @@ class BlackBox(LinearTruth):
 
     model = "linear_black_box"
     takes_torque = False
+    names = ("a21", "a22", "b21")
     a21: FloatArray
     a22: FloatArray
     b21: FloatArray
     trim: FloatArray
-
-    @property
-    def parameters(self) -> Mapping[str, FloatArray]:
-        """a21 [1/s²], a22 [1/s] and b21 [1]."""
-        return {"a21": self.a21, "a22": self.a22, "b21": self.b21}
 
     @property
     def system(self) -> System:
@@ -120,42 +110,23 @@ class BlackBox(LinearTruth):
         return System(-self.a21, -self.a22, self.b21, np.zeros_like(self.b21), self.trim)
 
 
-# One sample period, prepared: stiffness, damping, compliance, rest, [(gain z_ddot, noise), ...] of its substeps
-_Row = tuple[float, float, float, float, list[list[float]]]
-
-
-def _rows(system: System, conditions: Conditions) -> Iterator[_Row]:
-    """Yield the sample periods between the samples, in order."""
-    columns = (system.stiffness, system.damping, system.compliance, system.rest)
-    for block in conditions.blocks():
-        at = block.periods
-        noise = block.kick + system.compliance[at, None] * block.push
-        drive = np.stack((system.gain[at, None] * block.z_ddot, noise), axis=2).tolist()
-        yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
-
-
-class LinearPlant:
+class LinearPlant(Body):
     """System and motor: a truth.Body."""
 
     def __init__(self, system: System, conditions: Conditions) -> None:
-        self.theta = float(system.rest[0])
-        self.theta_dot = 0.0
-        self.tau_m = 0.0
-        self.grip_force = math.nan
-        self._step = conditions.step
-        self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
-        self._rows = _rows(system, conditions)
+        super().__init__(float(system.rest[0]), conditions)
+        self._rows = conditions.rows(tuple(vars(system).values()))
 
     def advance(self, command: float) -> None:
         """To the next sample, with the torque `command` [N m] held. Raise StopIteration after the last sample."""
         theta, theta_dot, torque = self.theta, self.theta_dot, self.tau_m - command
-        stiffness, damping, compliance, rest, drive = next(self._rows)
+        stiffness, damping, gain, compliance, rest, drive = next(self._rows)
         step, lag_middle, lag = self._step, self._lag_middle, self._lag
         half = 0.5 * step
-        for shake, noise in drive:
-            force = shake + compliance * (command + torque * lag_middle)
+        for acceleration, kick, push in drive:
+            force = gain * acceleration + compliance * (command + torque * lag_middle)
             force -= stiffness * (theta + half * theta_dot - rest) + damping * theta_dot
-            change = (step * force + noise) / (1.0 + half * damping)
+            change = (step * force + (kick + compliance * push)) / (1.0 + half * damping)
             theta += step * (theta_dot + 0.5 * change)
             theta_dot += change
             torque *= lag

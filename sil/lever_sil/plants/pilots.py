@@ -13,9 +13,13 @@ from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 
 from ..toml_tables import choice, item, quantity, read_kind, read_table, tables
 from . import hysteretic_plant, lever_plant, linear_plant, mayo_plant, reflex_plant, two_dof_plant
+from .lever_plant import Lever, Preload
 from .trajectories import Constant, Trajectory, read_trajectory
 from .truth import Truth
 from .window import Window
+
+Values = Mapping[str, FloatArray]
+"""Parameters by name, a value a sample."""
 
 _SIDES = {1: "falls to {least:g}; it must stay above 0", -1: "rises to {greatest:g}; it must stay below 0"}
 
@@ -34,7 +38,7 @@ class Pilot(ABC):
     """The parameters: 1 for one that must stay above 0, -1 below 0, 0 for either."""
 
     trim: Trajectory | None = item(read_trajectory(), "rad", None)
-    preload: lever_plant.Preload = choice("trim", "fixed", default="trim")
+    preload: Preload = choice("trim", "fixed", default="trim")
     process_noise: float = quantity("rad/s/sqrt(s)", 0.05, least=0.0)
 
     def __post_init__(self) -> None:
@@ -51,7 +55,7 @@ class Pilot(ABC):
         """Return times [s] at which they jump."""
         return {time for trajectory in self.trajectories().values() for time in trajectory.changes()}
 
-    def truth(self, time: FloatArray, stream: Callable[[str], np.random.Generator], lever: lever_plant.Lever) -> Truth:
+    def truth(self, time: FloatArray, stream: Callable[[str], np.random.Generator], lever: Lever) -> Truth:
         """Return the pilot on `lever` at the times [s]; `stream` gives the random numbers of a parameter.
 
         Raise ValueError for a parameter that loses its sign, or a trim beyond the vertical.
@@ -70,9 +74,7 @@ class Pilot(ABC):
         return self.build(time, values, trim, lever)
 
     @abstractmethod
-    def build(
-        self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
-    ) -> Truth:
+    def build(self, time: FloatArray, values: Values, trim: FloatArray, lever: Lever) -> Truth:
         """Return the truth with these parameters and trim angles at the times [s]."""
 
 
@@ -116,9 +118,7 @@ class LeverPilot(ArmPilot):
         """Return times [s] of jumps, including those at which the hands leave and take the lever."""
         return super().changes() | {time for off in self.hands_off for time in (off.start, off.end)}
 
-    def build(
-        self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
-    ) -> Truth:
+    def build(self, time: FloatArray, values: Values, trim: FloatArray, lever: Lever) -> Truth:
         """Where he lets go, the lever's spring keeps its place until he takes it again."""
         if not self.hands_off:
             return lever_plant.LeverTruth(lever, lever_plant.Truth(**values, trim=trim), self.preload)
@@ -139,9 +139,7 @@ class PhysicalPilot(Pilot):
     c: Trajectory = item(read_trajectory(), "N s/m")
     k: Trajectory = item(read_trajectory(), "N/m")
 
-    def build(
-        self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
-    ) -> Truth:
+    def build(self, time: FloatArray, values: Values, trim: FloatArray, lever: Lever) -> Truth:
         """Return a mass on spring and damper."""
         return linear_plant.Physical(**values, trim=trim)
 
@@ -157,9 +155,7 @@ class BlackBoxPilot(Pilot):
     a22: Trajectory = item(read_trajectory(), "1/s")
     b21: Trajectory = item(read_trajectory(), "1")
 
-    def build(
-        self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
-    ) -> Truth:
+    def build(self, time: FloatArray, values: Values, trim: FloatArray, lever: Lever) -> Truth:
         """Return a black box of second order."""
         return linear_plant.BlackBox(**values, trim=trim)
 
@@ -172,14 +168,12 @@ class TwoDofPilot(ArmPilot):
     about = "the arm hangs on a trunk that gives way on its seat, so that two masses swing"
     about_dynamics = "The truth is the one of its two modes that answers more between 2 and 8 Hz."
     signs: ClassVar[Mapping[str, int]] = {"m_p": 1, "c_p": 1, "k_p": 1, "m_t": 1, "c_t": 1, "k_t": 1}
-    preload: lever_plant.Preload = choice("trim", default="trim")
+    preload: Preload = choice("trim", default="trim")
     m_t: Trajectory = item(read_trajectory(), "kg", Constant(two_dof_plant.TRUNK_MASS))
     c_t: Trajectory = item(read_trajectory(), "N s/m", Constant(two_dof_plant.TRUNK_DAMPING))
     k_t: Trajectory = item(read_trajectory(), "N/m", Constant(two_dof_plant.TRUNK_STIFFNESS))
 
-    def build(
-        self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
-    ) -> Truth:
+    def build(self, time: FloatArray, values: Values, trim: FloatArray, lever: Lever) -> Truth:
         """Return a lever whose pilot's trunk moves on the seat."""
         return two_dof_plant.TwoDof(lever, **values, trim=trim)
 
@@ -195,14 +189,12 @@ class HystereticPilot(Pilot):
     )
     about_dynamics = "The truth is the mode that answers most between 2 and 8 Hz."
     signs: ClassVar[Mapping[str, int]] = {"m_p": 1, "k_p": 1}
-    preload: lever_plant.Preload = choice("trim", default="trim")
+    preload: Preload = choice("trim", default="trim")
     m_p: Trajectory = item(read_trajectory(), "kg")
     k_p: Trajectory = item(read_trajectory(), "N/m")
     loss_factor: float = quantity("1", above=0.0, greatest=2.0)
 
-    def build(
-        self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
-    ) -> Truth:
+    def build(self, time: FloatArray, values: Values, trim: FloatArray, lever: Lever) -> Truth:
         """Return a lever whose arm has hysteretic damping."""
         return hysteretic_plant.Hysteretic(lever, self.loss_factor, **values, trim=trim)
 
@@ -215,14 +207,12 @@ class ReflexPilot(ArmPilot):
     about = "an arm with a stretch reflex, which pulls against the motion a few hundredths of a second late"
     about_dynamics = "The truth is the mode that answers most between 2 and 8 Hz."
     signs: ClassVar[Mapping[str, int]] = {"m_p": 1, "c_p": 1, "k_p": 1, "k_r": 0, "c_r": 0}
-    preload: lever_plant.Preload = choice("trim", default="trim")
+    preload: Preload = choice("trim", default="trim")
     k_r: Trajectory = item(read_trajectory(), "N/m")
     c_r: Trajectory = item(read_trajectory(), "N s/m")
     delay: float = quantity("s", reflex_plant.DELAY, least=0.02, greatest=0.2)
 
-    def build(
-        self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
-    ) -> Truth:
+    def build(self, time: FloatArray, values: Values, trim: FloatArray, lever: Lever) -> Truth:
         """Return a lever whose arm reacts a delay late."""
         return reflex_plant.Reflex(lever, self.delay, **values, trim=trim)
 
@@ -235,12 +225,10 @@ class MayoPilot(Pilot):
     about = "a hand that follows the cabin as Mayo (1989) measured it on people, by a transfer function"
     about_dynamics = "The truth is that of the poles of the hand's transfer function."
     signs: ClassVar[Mapping[str, int]] = {}
-    preload: lever_plant.Preload = choice("trim", default="trim")
+    preload: Preload = choice("trim", default="trim")
     somatotype: str = choice(*mayo_plant.HANDS)
 
-    def build(
-        self, time: FloatArray, values: Mapping[str, FloatArray], trim: FloatArray, lever: lever_plant.Lever
-    ) -> Truth:
+    def build(self, time: FloatArray, values: Values, trim: FloatArray, lever: Lever) -> Truth:
         """Return the hand of the pilot's somatotype as Mayo measured it."""
         return mayo_plant.Mayo(mayo_plant.HANDS[self.somatotype], lever.lever_length, trim)
 

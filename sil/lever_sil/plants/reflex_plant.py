@@ -19,7 +19,6 @@ dynamics are those of its dominant mode.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +27,7 @@ from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from . import lever_plant
-from .truth import Conditions, Dynamics, Truth, dominant_dynamics
+from .truth import Conditions, ManyModes
 
 DELAY = 0.035
 """T where nothing else is said [s]."""
@@ -36,11 +35,12 @@ _ORDER = 4
 
 
 @dataclass(frozen=True)
-class Reflex(Truth):
+class Reflex(ManyModes):
     """The lever, and the pilot at every sample: arrays of equal length [kg, N s/m, N/m, N/m, N s/m, rad]."""
 
     model = "reflex"
     has_grip_force = True
+    names = ("m_p", "c_p", "k_p", "k_r", "c_r")
     lever: lever_plant.Lever
     delay: float
     """[s]"""
@@ -52,24 +52,9 @@ class Reflex(Truth):
     trim: FloatArray
 
     @property
-    def parameters(self) -> Mapping[str, FloatArray]:
-        """m_p, c_p and k_p of the arm, k_r and c_r of the delayed reaction, in SI units."""
-        return {name: getattr(self, name) for name in ("m_p", "c_p", "k_p", "k_r", "c_r")}
-
-    @property
     def arm(self) -> lever_plant.LeverTruth:
         """What does not come late."""
         return lever_plant.LeverTruth(self.lever, lever_plant.Truth(self.m_p, self.c_p, self.k_p, self.trim), "trim")
-
-    @property
-    def rest(self) -> FloatArray:
-        """The trim angle [rad]."""
-        return self.trim
-
-    @property
-    def dynamics(self) -> Dynamics:
-        """Natural frequency [Hz] and damping ratio of the dominant mode."""
-        return dominant_dynamics(self, *self.parameters.values(), self.trim)
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
         """N / (D + R exp(-s T)) with N / D of the arm alone and exp(-s T) = P(-s) / P(s)."""

@@ -9,7 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from lever_cdkf.models.transfer import Transfer
@@ -85,6 +85,12 @@ class Conditions:
                 self.step * self.middles(disturbance[begin : end + 1]),
             )
 
+    def rows(self, columns: tuple[FloatArray, ...]) -> Iterator[tuple[Any, ...]]:
+        """Yield the columns at each period between the samples, and [(z_ddot, kick, push), ...] of its substeps."""
+        for block in self.blocks():
+            drive = np.stack((block.z_ddot, block.kick, block.push), axis=2).tolist()
+            yield from zip(*(column[block.periods].tolist() for column in columns), drive, strict=True)
+
     def middles(self, signal: FloatArray) -> FloatArray:
         """Return a signal, given at the samples and linear between them, in the middle of each substep."""
         part = (np.arange(self.count) + 0.5) / self.count
@@ -105,19 +111,23 @@ class Block:
     """Impulse of the disturbance [N m s]."""
 
 
-class Body(Protocol):
-    """A lever that moves. It starts at rest; torque is 0."""
+class Body(ABC):
+    """A lever that moves. It starts at rest at `theta`; torque is 0."""
 
-    theta: float
-    """[rad]"""
-    theta_dot: float
-    """[rad/s]"""
-    tau_m: float
-    """Motor torque that acts [N m]."""
-    grip_force: float
-    """Of the hand on the lever, across it, positive where it raises theta: mean since the last sample [N]; NaN where it
-    is not modelled."""
+    def __init__(self, theta: float, conditions: Conditions) -> None:
+        self.theta = theta
+        """[rad]"""
+        self.theta_dot = 0.0
+        """[rad/s]"""
+        self.tau_m = 0.0
+        """Motor torque that acts [N m]."""
+        self.grip_force = math.nan
+        """Of the hand on the lever, across it, positive where it raises theta: mean since the last sample [N]; NaN
+        where it is not modelled."""
+        self._step = conditions.step
+        self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
 
+    @abstractmethod
     def advance(self, command: float) -> None:
         """To the next sample, with the torque `command` [N m] held. Raise StopIteration after the last sample."""
 
@@ -131,11 +141,13 @@ class Truth(ABC):
     """Whether a torque, of the motor or a disturbance, means something to it."""
     has_grip_force: ClassVar[bool] = False
     """Whether its body knows the force of the hand on the lever."""
+    names: ClassVar[tuple[str, ...]] = ()
+    """Of the parameters, which are its columns of these names."""
 
     @property
-    @abstractmethod
     def parameters(self) -> Mapping[str, FloatArray]:
         """The model's parameters by name, SI units; NaN while the hands are off the lever."""
+        return {name: getattr(self, name) for name in self.names}
 
     @property
     @abstractmethod
@@ -176,12 +188,24 @@ def _part(value: Any, samples: slice) -> Any:
     return replace(value, **parts)
 
 
-def dominant_dynamics(truth: Truth, *columns: FloatArray) -> Dynamics:
-    """Return the dynamics of the dominant mode of its transfer function.
+class ManyModes(Truth):
+    """A truth with more than one mode, whose lever rests at the trim."""
 
-    They are worked out only where one of its `columns` has changed: eigenvalues take long.
-    """
-    new = np.append(True, np.any(np.diff(np.stack(columns), axis=1) != 0.0, axis=0))
-    frequency, ratio = truth.transfer(np.flatnonzero(new)).dominant_mode()
-    held = np.cumsum(new) - 1
-    return Dynamics(frequency[held], ratio[held])
+    trim: FloatArray
+
+    @property
+    def rest(self) -> FloatArray:
+        """The trim angle [rad]."""
+        return self.trim
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """Natural frequency [Hz] and damping ratio of the dominant mode.
+
+        They are worked out only where the trim or a parameter has changed: eigenvalues take long.
+        """
+        columns = np.stack((*self.parameters.values(), self.trim))
+        new = np.append(True, np.any(np.diff(columns, axis=1) != 0.0, axis=0))
+        frequency, ratio = self.transfer(np.flatnonzero(new)).dominant_mode()
+        held = np.cumsum(new) - 1
+        return Dynamics(frequency[held], ratio[held])

@@ -28,7 +28,6 @@ linearly implicit midpoint rule with a damping matrix of two by two.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,17 +36,18 @@ from lever_cdkf.numeric.arrays import FloatArray
 from numpy.typing import NDArray
 
 from . import lever_plant
-from .truth import Conditions, Dynamics, Truth, dominant_dynamics
+from .truth import Body, Conditions, ManyModes
 
 TRUNK_MASS, TRUNK_DAMPING, TRUNK_STIFFNESS = 45.0, 1000.0, 36000.0
 """m_t [kg], c_t [N s/m] and k_t [N/m] where nothing else is said."""
 
 
 @dataclass(frozen=True)
-class TwoDof(Truth):
+class TwoDof(ManyModes):
     """The lever, and the pilot at every sample: arrays of equal length [kg, N s/m, N/m, rad]."""
 
     model = "two_dof"
+    names = ("m_p", "c_p", "k_p", "m_t", "c_t", "k_t")
     lever: lever_plant.Lever
     m_p: FloatArray
     c_p: FloatArray
@@ -58,24 +58,9 @@ class TwoDof(Truth):
     trim: FloatArray
 
     @property
-    def parameters(self) -> Mapping[str, FloatArray]:
-        """m_p, c_p and k_p of the arm, m_t, c_t and k_t of trunk and seat, in SI units."""
-        return {name: getattr(self, name) for name in ("m_p", "c_p", "k_p", "m_t", "c_t", "k_t")}
-
-    @property
     def arm(self) -> lever_plant.Truth:
         """The arm alone."""
         return lever_plant.Truth(self.m_p, self.c_p, self.k_p, self.trim)
-
-    @property
-    def rest(self) -> FloatArray:
-        """The trim angle [rad]."""
-        return self.trim
-
-    @property
-    def dynamics(self) -> Dynamics:
-        """Natural frequency [Hz] and damping ratio of the dominant mode."""
-        return dominant_dynamics(self, *self.parameters.values(), self.trim)
 
     def transfer(self, samples: NDArray[np.intp]) -> Transfer:
         """By Cramer's rule from the two equations, linearised; a = l cos theta_0 is the grip's rise per angle."""
@@ -110,32 +95,15 @@ def coefficients(truth: TwoDof) -> tuple[FloatArray, ...]:
     return (mass, moment, *springs, np.sin(truth.trim), truth.trim)
 
 
-# One sample period, prepared: coefficients(), [(z_ddot, M times noise), ...]
-_Row = tuple[float, float, float, float, float, float, float, float, float, list[list[float]]]
-
-
-def _rows(columns: tuple[FloatArray, ...], conditions: Conditions) -> Iterator[_Row]:
-    """Yield the sample periods between the samples, in order."""
-    for block in conditions.blocks():
-        at = block.periods
-        drive = np.stack((block.z_ddot, columns[0][at, None] * block.kick + block.push), axis=2).tolist()
-        yield from zip(*(column[at].tolist() for column in columns), drive, strict=True)
-
-
-class TwoDofPlant:
+class TwoDofPlant(Body):
     """Lever, arm, trunk and motor: a truth.Body; `s` and `s_dot` are the trunk's [m, m/s]."""
 
     def __init__(self, truth: TwoDof, conditions: Conditions) -> None:
-        self.theta = float(truth.trim[0])
-        self.theta_dot = 0.0
-        self.tau_m = 0.0
-        self.grip_force = math.nan
+        super().__init__(float(truth.trim[0]), conditions)
         self.s = 0.0
         self.s_dot = 0.0
         self._lever = truth.lever
-        self._step = conditions.step
-        self._lag_middle, self._lag = conditions.decay(0.5), conditions.decay(1.0)
-        self._rows = _rows(coefficients(truth), conditions)
+        self._rows = conditions.rows(coefficients(truth))
 
     def advance(self, command: float) -> None:
         """To the next sample, with the torque `command` [N m] held. Raise StopIteration after the last sample."""
@@ -144,7 +112,7 @@ class TwoDofPlant:
         step, lag_middle, lag = self._step, self._lag_middle, self._lag
         length, own_stiffness = self._lever.lever_length, self._lever.lever_stiffness
         half = 0.5 * step
-        for base, noise in drive:
+        for base, kick, push in drive:
             middle, trunk = theta + half * theta_dot, s + half * s_dot
             cosine = math.cos(middle)
             rise = length * cosine
@@ -153,7 +121,7 @@ class TwoDofPlant:
             resistance, slope = lever_plant.resistance(self._lever, theta_dot)
             lever -= resistance + own_stiffness * (middle - rest)
             seat = arm - m_t * base - c_t * s_dot - k_t * trunk
-            lever, seat = step * lever + noise, step * seat
+            lever, seat = step * lever + (inertia * kick + push), step * seat
             cross = -half * c_p * rise
             lever_mass, trunk_mass = inertia + half * slope - cross * rise, m_t + half * (c_p + c_t)
             determinant = lever_mass * trunk_mass - cross * cross
