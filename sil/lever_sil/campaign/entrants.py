@@ -119,11 +119,8 @@ class Published(Entrant):
 
     def unfit(self, scenario: Scenario) -> str:
         """Return why the baseline cannot be run: its model, the preload, or dropouts; empty if it can."""
-        kind = KINDS.get(scenario.config.choices["model"])
-        if kind is None:
+        if scenario.config.choices["model"] not in KINDS:
             return f"has no model {scenario.config.choices['model']!r}"
-        if not BASELINES[self.name].handles(kind.make(scenario.config.settings, scenario.config.choices["preload"])):
-            return f"cannot be used with the model {scenario.config.choices['model']!r}"
         if scenario.config.choices["preload"] != "trim":
             return "needs preload trim here: where a lever with preload fixed rests depends on what is estimated"
         return "needs every sample, and this scenario has dropouts" if scenario.sensors.dropout else ""

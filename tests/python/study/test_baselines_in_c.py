@@ -1,4 +1,4 @@
-"""The Kalman-type baselines in C against the classes in Python, of which each is tested against a textbook filter."""
+"""The Kalman-type baselines in C against their reference in numpy, which is tested against textbook filters."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lever_cdkf.errors import LeverError
 from lever_sil.study.baselines import BASELINES
-from lever_sil.study.baselines.algorithm1 import ParameterFilter
-from lever_sil.study.baselines.dual_ekf import DualEkf
-from lever_sil.study.baselines.joint_ekf import JointEkf
-from lever_sil.study.baselines.joint_ukf import JointUkf
-from lever_sil.study.baselines.recursion import Recursion, follow
 from lever_sil.study.compare import cases, run_cases
 from lever_sil.study.data import Batch
+from numpy.typing import NDArray
+from python.study.reference_filters import DualEkf, JointEkf, JointUkf, ParameterFilter, Recursion, follow
 
 REFERENCES: dict[str, tuple[Callable[[Batch], Recursion], float]] = {
     "joint_ekf": (JointEkf, 1e-5),
@@ -37,7 +35,10 @@ CASES = (
 def test_the_c_says_what_the_reference_says(name: str, baseline: str) -> None:
     case = cases.cases()[name]
     batch = case.batch(cases.Plan(seeds=2, duration=2.0))
-    at = np.append(0, run_cases.samples(case, batch))  # also before the first sample is followed
+    agree(baseline, batch, np.append(0, run_cases.samples(case, batch)))  # also before the first sample is followed
+
+
+def agree(baseline: str, batch: Batch, at: NDArray[np.int64]) -> None:
     reference, near = REFERENCES[baseline]
     quick, slow = BASELINES[baseline].run(batch, at), follow(reference(batch), at)
     assert quick.covariance is not None
@@ -50,11 +51,20 @@ def test_the_c_says_what_the_reference_says(name: str, baseline: str) -> None:
     np.testing.assert_allclose(quick.nis, slow.nis, rtol=near, atol=near)
 
 
-def test_a_missing_output_is_left_to_the_reference() -> None:
+@pytest.mark.parametrize("baseline", ["joint_ekf", "joint_ukf"])
+def test_a_missing_output_is_skipped_as_the_reference_does(baseline: str) -> None:
+    """Theta of every sample, or now and then one of them or both."""
     case = cases.cases()["lever_trim_base_rough"]
     batch = case.batch(cases.Plan(seeds=2, duration=1.0))
     at = run_cases.samples(case, batch)
     half = replace(batch, missing=np.tile([True, False], (2, batch.samples, 1)))
-    expected = follow(JointEkf(half), at)
-    assert np.array_equal(BASELINES["joint_ekf"].run(half, at).w, expected.w)
-    assert not np.allclose(BASELINES["joint_ekf"].run(batch, at).w, expected.w)
+    some = replace(batch, missing=np.random.default_rng(1).random((2, batch.samples, 2)) < 0.3)
+    for one in (half, some):
+        agree(baseline, one, at)
+        assert not np.allclose(BASELINES[baseline].run(batch, at).w, BASELINES[baseline].run(one, at).w)
+
+
+def test_a_model_that_the_c_has_not_is_refused() -> None:
+    batch = replace(cases.cases()["step_up"].batch(cases.Plan(seeds=1, duration=1.0)), model=object())  # type: ignore[arg-type]
+    with pytest.raises(LeverError, match="joint_ekf has no model object"):
+        BASELINES["joint_ekf"].run(batch, np.array([1]))

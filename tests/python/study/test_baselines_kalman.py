@@ -1,4 +1,4 @@
-"""The Kalman-type baselines, against FilterPy's plain filters where those are exact."""
+"""The reference of the Kalman-type baselines, against FilterPy's plain filters where those are exact."""
 
 from __future__ import annotations
 
@@ -9,13 +9,17 @@ import numpy as np
 import pytest
 from filterpy.kalman import ExtendedKalmanFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
 from lever_cdkf.numeric.arrays import Array
-from lever_sil.study.baselines.algorithm1 import ParameterFilter
-from lever_sil.study.baselines.dual_ekf import DualEkf
-from lever_sil.study.baselines.joint_ekf import JointEkf
-from lever_sil.study.baselines.joint_ukf import JointUkf, UnscentedTransform
-from lever_sil.study.baselines.recursion import factor, follow
 from lever_sil.study.data import Batch
 from python.study.baseline_runs import PERIOD, Plan, lever, simulate
+from python.study.reference_filters import (
+    DualEkf,
+    JointEkf,
+    JointUkf,
+    ParameterFilter,
+    UnscentedTransform,
+    factor,
+    follow,
+)
 
 SETTLE, STIFFNESS = 12.0, 500.0
 

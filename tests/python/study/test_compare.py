@@ -48,12 +48,11 @@ def test_every_model_and_estimator_of_the_firmware_is_compared() -> None:
                 assert entrants(case).keys() >= set(enum_names("lever_estimator").values())
 
 
-def test_every_baseline_takes_part_with_every_model_that_it_handles() -> None:
+def test_every_baseline_takes_part_with_every_model() -> None:
     for model in MODELS:
         own = [case for case in cases().values() if case.model == model and case.kind == "matched"]
         there = {name for case in own for name in entrants(case)}
-        known = cases()[own[0].name].batch(Plan(1, 1.0)).model
-        assert there >= {name for name, baseline in BASELINES.items() if baseline.handles(known)}, model
+        assert there >= BASELINES.keys(), model
 
 
 def test_walks_and_steps_are_as_the_comparison_was_asked_for() -> None:

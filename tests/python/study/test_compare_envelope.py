@@ -17,10 +17,9 @@ from lever_sil.envelope import conditions
 from lever_sil.envelope.condition import Condition
 from lever_sil.envelope.measure import FIGURES, Outcome
 from lever_sil.plants.sensors import INVALID, Reads
-from lever_sil.study.baselines.joint_ekf import Joint
 from lever_sil.study.compare_envelope import filters, logs, run_estimators, tables
 from lever_sil.study.compare_envelope.run_estimators import ESTIMATORS, EstimatorResult
-from lever_sil.study.data import Batch
+from lever_sil.study.data import Batch, Estimates
 from numpy.typing import NDArray
 from python.conftest import Refused
 
@@ -108,7 +107,7 @@ def test_feedthrough_is_as_uncertain_as_a_cloud_of_parameters() -> None:
     """The lever's transfer function written out, at a trim of 20 degrees."""
     (log,) = logs.logs([Condition("still", "", Motion(duration=0.2))], 1)
     log = dataclasses.replace(log, trim=np.radians([20.0]))
-    peer = filters.JointFilter("", Fixed, False)
+    peer = filters.JointFilter("", fixed, False)
     found = filters.tracks([log], peer)[0].feedthrough
     assert found is not None
     m_p, c_p, k_p = np.array([2.5, 42.0, 1500.0])[:, None, None] * np.exp(
@@ -123,15 +122,10 @@ def test_feedthrough_is_as_uncertain_as_a_cloud_of_parameters() -> None:
     np.testing.assert_allclose(found.phase_sigma[0, 0], np.angle(ratio).std(axis=0), rtol=0.03)
 
 
-class Fixed(Joint):
+def fixed(batch: Batch, at: NDArray[np.int64]) -> Estimates:
     """Stays at the first guess, 1 % uncertain."""
-
-    def __init__(self, batch: Batch) -> None:
-        super().__init__(batch)
-        self.covariance = 1e-4 * np.broadcast_to(np.eye(5), (batch.runs, 5, 5))
-
-    def step(self, k: int) -> None:
-        pass
+    covariance = 1e-4 * np.broadcast_to(np.eye(3), (batch.runs, len(at), 3, 3))
+    return Estimates(at, np.zeros((batch.runs, len(at), 3)), covariance)
 
 
 def test_progress_counts_conditions(monkeypatch: pytest.MonkeyPatch) -> None:

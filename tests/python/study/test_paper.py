@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from lever_cdkf.firmware.config import setting
 from lever_cdkf.numeric.arrays import Array
-from lever_sil.study.baselines.algorithm1 import ParameterFilter
 from lever_sil.study.compare import paper, run_cases
 from lever_sil.study.compare.cases import Plan, cases
 from lever_sil.study.data import Batch, Knowledge, Truth
+from python.study.reference_filters import ParameterFilter
 
 SAMPLES, PERIOD = 1001, 1e-3
 P = np.array([1.5, -0.7, 0.3])

@@ -7,6 +7,9 @@
 enum { N = FILTER_Z, W = FILTER_W, X = FILTER_STATES, POINTS = FILTER_POINTS };
 
 static const double root3 = 1.7320508075688772; /* h of the central difference filters */
+static const double reach = 5.0; /* unscented: n + lambda, of alpha 1 and kappa 0; a point weighs 0.5 / reach, */
+static const double centre_weight = 2.0; /* the centre 1 - alpha^2 + beta in the covariance, and 0 in the mean */
+static const double skipped = 1.0e12;    /* variance of a missing output over what it is: it counts for nothing */
 
 /* One filter; of each kind its own part of it. */
 typedef struct filter {
@@ -246,15 +249,14 @@ static double side_of(uint32_t point)
 /* P of deviations from the mean, of which those of the states still are values with the mean `predicted`. */
 static void gather(filter_t *f, double deviation[POINTS][N], const double predicted[X])
 {
-    const filter_given_t *given = f->given;
-    const double weight = 0.5 / given->reach;
+    const double weight = 0.5 / reach;
     for (uint32_t point = 0u; point < (uint32_t)POINTS; point++) {
         deviation[point][3] -= predicted[0];
         deviation[point][4] -= predicted[1];
     }
     for (uint32_t i = 0u; i < (uint32_t)N; i++) {
         for (uint32_t j = 0u; j < (uint32_t)N; j++) {
-            double sum = given->covariance_weight * deviation[0][i] * deviation[0][j];
+            double sum = centre_weight * deviation[0][i] * deviation[0][j];
             for (uint32_t point = 1u; point < (uint32_t)POINTS; point++) {
                 sum += weight * deviation[point][i] * deviation[point][j];
             }
@@ -268,8 +270,8 @@ static void predict_ukf(filter_t *f, uint32_t k)
 {
     const filter_given_t *given = f->given;
     const inputs_t in = inputs_at(given, k);
-    const double root = sqrt(given->reach);
-    const double weight = 0.5 / given->reach;
+    const double root = sqrt(reach);
+    const double weight = 0.5 / reach;
     angle_t angle = {(double)NAN, 0.0, 0.0};
     double factor[N][N];
     double deviation[POINTS][N];
@@ -295,7 +297,7 @@ static void predict_ukf(filter_t *f, uint32_t k)
         move(given, p, &in, &angle, x);
         for (uint32_t i = 0u; i < (uint32_t)X; i++) {
             deviation[point][(uint32_t)W + i] = x[i];
-            predicted[i] += ((point == 0u) ? given->mean_weight : weight) * x[i];
+            predicted[i] += (point == 0u) ? 0.0 : (weight * x[i]);
         }
     }
     gather(f, deviation, predicted);
@@ -318,14 +320,19 @@ static void step_joint(filter_t *f, uint32_t k)
     for (uint32_t i = 0u; i < (uint32_t)X; i++) {
         for (uint32_t j = 0u; j < (uint32_t)X; j++) {
             f->p[(uint32_t)W + i][(uint32_t)W + j] += given->process[i][j];
-            f->s[i][j] = f->p[(uint32_t)W + i][(uint32_t)W + j] + ((i == j) ? squared(given->output_noise[i]) : 0.0);
+            f->s[i][j] = f->p[(uint32_t)W + i][(uint32_t)W + j];
         }
+    }
+    innovate(f, given->y[k], f->x);
+    for (uint32_t i = 0u; i < (uint32_t)X; i++) {
+        const bool is_missing = (given->missing != NULL) && (given->missing[k][i] != 0u);
+        f->innovation[i] = is_missing ? 0.0 : f->innovation[i];
+        f->s[i][i] += squared(given->output_noise[i]) * (is_missing ? skipped : 1.0);
     }
     for (uint32_t i = 0u; i < (uint32_t)N; i++) {
         cross[i][0] = f->p[i][3];
         cross[i][1] = f->p[i][4];
     }
-    innovate(f, given->y[k], f->x);
     correct(f, (uint32_t)N, cross, z, &f->p[0][0]);
     (void)memcpy(f->w, z, sizeof f->w);
     (void)memcpy(f->x, &z[W], sizeof f->x);

@@ -1,5 +1,5 @@
-/* The Kalman filters of study/baselines, at the speed of C: joint_ekf.py, dual_ekf.py, joint_ukf.py, algorithm1.py, which
- * are the reference and say where they are from. In double precision; without missing outputs.
+/* The Kalman filters of study/baselines in double precision: joint_ekf.py, dual_ekf.py, joint_ukf.py and algorithm1.py say
+ * where they are from.
  */
 #ifndef FILTERS_H
 #define FILTERS_H
@@ -44,12 +44,10 @@ typedef struct filter_given {
     double process[FILTER_STATES][FILTER_STATES]; /* covariance over `steps` samples, or one */
     uint32_t steps;                               /* of FILTER_PARAMETERS: samples ahead */
     double difference;                            /* half-width of central differences */
-    double reach;                                 /* of FILTER_JOINT_UKF: n + lambda, */
-    double mean_weight;                           /* and the weights of the centre */
-    double covariance_weight;
     const double (*y)[FILTER_STATES];
     const double (*u)[FILTER_STATES];
     const double *trim;
+    const uint8_t (*missing)[FILTER_STATES]; /* which of y the joint filters skip; NULL: none */
 } filter_given_t;
 
 /* What it says after the samples `at`, which rise: `count` values of each. */

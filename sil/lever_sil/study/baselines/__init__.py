@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..data import Estimator, Model
+from ..data import Estimator
 from .algorithm1 import Algorithm1
-from .balance import MODELS as LINEAR_IN_COEFFICIENTS
 from .dual_ekf import dual_ekf
 from .joint_ekf import joint_ekf
 from .joint_ukf import joint_ukf
@@ -28,12 +27,6 @@ class Baseline:
     title: str
     source: str
     run: Estimator
-    models: tuple[type, ...] = (object,)
-    """The classes of models that it can be used with; by default any."""
-
-    def handles(self, model: Model) -> bool:
-        """Return whether it can be used with a model."""
-        return isinstance(model, self.models)
 
 
 BASELINES = {
@@ -64,15 +57,13 @@ BASELINES = {
             "recursive least squares with exponential forgetting",
             "Ljung and Söderström 1983",
             Rls(),
-            LINEAR_IN_COEFFICIENTS,
         ),
         Baseline(
             "rls_regularised",
             "the same, without forgetting the first guess",
             "Gunnarsson 1996",
             Rls(regularised=True),
-            LINEAR_IN_COEFFICIENTS,
         ),
-        Baseline("lms", "normalised least mean squares", "Elliott 2001", Nlms(), LINEAR_IN_COEFFICIENTS),
+        Baseline("lms", "normalised least mean squares", "Elliott 2001", Nlms()),
     )
 }

@@ -25,9 +25,6 @@ from lever_cdkf.numeric.arrays import Array
 
 from ..data import Batch
 
-MODELS = (Lever, LinearPhysical, LinearBlackBox)
-"""Those that can be written so."""
-
 
 class Coefficients(Protocol):
     """What q has to do with the parameters p; arrays (…, 3)."""
@@ -97,7 +94,7 @@ class Balance:
 
 
 def balance(batch: Batch) -> Balance:
-    """Return the balance of what was measured. Raise LeverError for a model that is none of MODELS."""
+    """Return the balance of what was measured. Raise LeverError for a model of another kind."""
     if isinstance(batch.model, Lever):
         return _of_lever(batch, batch.model)
     if isinstance(batch.model, LinearPhysical):

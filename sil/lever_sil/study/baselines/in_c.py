@@ -1,14 +1,12 @@
-"""The Kalman-type baselines by fast/c/filters.h; the classes in Python, which are slower, are their reference.
-
-Models of other projects, and batches with missing outputs, stay in Python.
-"""
+"""The Kalman-type baselines by fast/c/filters.h."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.library import ffi
 from lever_cdkf.models.lever import Lever
 from lever_cdkf.models.linear import LinearBlackBox, LinearPhysical
 from lever_cdkf.text.units import GRAVITY
@@ -16,27 +14,21 @@ from numpy.typing import NDArray
 
 from ...fast.library import Struct, lib
 from ..data import PARAMETERS, Batch, Estimates, Model
-from .recursion import DIFFERENCE, Recursion, follow
 
+DIFFERENCE = 1e-5
+"""Half-width of a central difference in theta [rad], theta_dot [rad/s] or w [1]: near the cube root of float64's
+rounding, where the errors of truncation and of rounding are about equal."""
 _MODELS: dict[type[Any], str] = {Lever: "LEVER", LinearPhysical: "PHYSICAL", LinearBlackBox: "BLACK_BOX"}
 
 
-def followed(
-    kind: str,
-    batch: Batch,
-    at: NDArray[np.int64],
-    reference: Callable[[Batch], Recursion],
-    *,
-    steps: int = 1,
-    centre: Mapping[str, float] | None = None,
-) -> Estimates:
-    """Estimate as recursion.follow() does, by a FILTER_ of c/filters.h, or by the class that it stands for.
+def run_in_c(kind: str, batch: Batch, at: NDArray[np.int64], steps: int = 1) -> Estimates:
+    """Run a FILTER_ over a batch, run by run; report at the samples `at`. One that breaks down goes on as NaN.
 
-    That class is what `reference` makes. With `centre`: reach and weights of sigma points.
+    `steps`: of FILTER_PARAMETERS, samples from one update to the next. Raise LeverError for a model that it has not.
     """
-    if type(batch.model) not in _MODELS or batch.missing is not None:
-        return follow(reference(batch), at)
-    runs = [_run(kind, batch, run, at, steps, centre or {}) for run in range(batch.runs)]
+    if type(batch.model) not in _MODELS:
+        raise LeverError(f"{kind.lower()} has no model {type(batch.model).__name__}")
+    runs = [_run(kind, batch, run, at, steps) for run in range(batch.runs)]
     w, covariance, nis = (np.stack(parts) for parts in zip(*runs, strict=True))
     broken = ~np.isfinite(w).all(axis=2)
     w[broken], covariance[broken], nis[broken] = np.nan, np.nan, np.nan
@@ -44,7 +36,7 @@ def followed(
 
 
 def _run(
-    kind: str, batch: Batch, run: int, at: NDArray[np.int64], steps: int, centre: Mapping[str, float]
+    kind: str, batch: Batch, run: int, at: NDArray[np.int64], steps: int
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Return (T, 3) w, (T, 3, 3) covariance and (T,) NIS of a run."""
     struct, knowledge = Struct("filter_given_t"), batch.knowledge
@@ -55,10 +47,10 @@ def _run(
     for name in ("guess", "sigma", "sigma_w", "walk_w", "output_noise"):
         setattr(given, name, getattr(knowledge, name).tolist())
     given.process = knowledge.process_covariance(steps * batch.period).tolist()
-    for name, value in centre.items():
-        setattr(given, name, value)
     given.y, given.u = (struct.cast("double (*)[2]", values[run]) for values in (batch.y, batch.u))
     given.trim = struct.doubles(batch.trim[run])
+    if batch.missing is not None:
+        given.missing = ffi.cast("uint8_t (*)[2]", struct.array("uint8_t", batch.missing[run], np.uint8))
     said, count = Struct("filter_said_t"), len(at)
     w, covariance, nis = np.empty((count, PARAMETERS)), np.empty((count, PARAMETERS, PARAMETERS)), np.empty(count)
     said.pointer.at, said.pointer.count = said.array("int64_t", at, np.int64), count

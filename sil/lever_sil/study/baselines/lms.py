@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data import PARAMETERS, Batch, Estimates
-from .recursion import repeated
 from .regression import equations
 
 
@@ -35,7 +34,7 @@ class Nlms:
         guess, covariance = data.first_guess(batch.knowledge)
         scale = covariance.diagonal()
         q = np.empty((batch.runs, len(data.ends) + 1, PARAMETERS))
-        q[:, 0] = repeated(guess, batch.runs)
+        q[:, 0] = guess
         with np.errstate(over="ignore", invalid="ignore"):
             for j in range(len(data.ends)):
                 phi = data.regressors[:, j]

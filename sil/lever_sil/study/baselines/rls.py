@@ -25,7 +25,6 @@ from lever_cdkf.numeric.arrays import Array
 from numpy.typing import NDArray
 
 from ..data import PARAMETERS, Batch, Estimates
-from .recursion import apply, repeated
 from .regression import Equations, equations
 
 
@@ -47,13 +46,13 @@ class Rls:
         forget = math.exp(-data.period / self.forgetting)
         shape = (batch.runs, len(data.ends) + 1)
         q, covariance = np.empty((*shape, PARAMETERS)), np.empty((*shape, PARAMETERS, PARAMETERS))
-        q[:, 0], covariance[:, 0] = (repeated(prior, batch.runs) for prior in data.first_guess(batch.knowledge))
+        q[:, 0], covariance[:, 0] = data.first_guess(batch.knowledge)
         if self.regularised:
             return data.estimates(at, batch.knowledge, *_regularised(data, forget, q, covariance))
         with np.errstate(over="ignore", invalid="ignore"):
             for j in range(len(data.ends)):
                 phi, p = data.regressors[:, j], covariance[:, j]
-                cross = (p @ phi[:, :, np.newaxis])[:, :, 0]
+                cross = _times(p, phi)
                 error = data.target[:, j] - (phi * q[:, j]).sum(axis=1)
                 k = cross / (forget * data.variance + (phi * cross).sum(axis=1))[:, np.newaxis]
                 q[:, j + 1] = q[:, j] + k * error[:, np.newaxis]
@@ -61,10 +60,16 @@ class Rls:
         return data.estimates(at, batch.knowledge, q, covariance)
 
 
+def _times(matrices: Array, vectors: Array) -> Array:
+    """Return (B, n, m) times (B, m)."""
+    product: Array = (matrices @ vectors[:, :, np.newaxis])[:, :, 0]
+    return product
+
+
 def _regularised(data: Equations, forget: float, q: Array, covariance: Array) -> tuple[Array, Array]:
     """Fill q (B, J + 1, 3) and its covariance from their first entries on."""
     prior = np.linalg.inv(covariance[:, 0])
-    information, vector = prior, apply(prior, q[:, 0])
+    information, vector = prior, _times(prior, q[:, 0])
     first = vector
     for j in range(len(data.ends)):
         phi = data.regressors[:, j]
@@ -72,5 +77,5 @@ def _regularised(data: Equations, forget: float, q: Array, covariance: Array) ->
         information = forget * information + more + (1.0 - forget) * prior
         vector = forget * vector + phi * data.target[:, j, np.newaxis] / data.variance + (1.0 - forget) * first
         covariance[:, j + 1] = np.linalg.inv(information)
-        q[:, j + 1] = apply(covariance[:, j + 1], vector)
+        q[:, j + 1] = _times(covariance[:, j + 1], vector)
     return q, covariance

@@ -19,7 +19,6 @@ from ..baselines import BASELINES
 from ..candidate import candidate
 from ..data import Estimator
 from ..firmware import Firmware
-from ..matched import KINDS
 from .cases import Case
 
 OURS = ("dual", "joint")
@@ -57,17 +56,17 @@ def enter(name: str) -> None:
 def entrants(case: Case) -> dict[str, Entrant]:
     """Return those of a case, by name, ours first."""
     if case.kind == "paper":
-        chosen = _adaptations() + [each for each in _baselines(case) if each.name in _OF_THE_PAPER]
+        chosen = _adaptations() + [each for each in _baselines() if each.name in _OF_THE_PAPER]
     elif case.kind == "protocol":
-        chosen = _shipped()[:1] + [each for each in _baselines(case) if not each.name.startswith("algorithm1")]
+        chosen = _shipped()[:1] + [each for each in _baselines() if not each.name.startswith("algorithm1")]
     elif case.kind == "wrong noise":
         chosen = _given_noise() + _wrong()
     elif case.kind == "wrong tuning":
         chosen = _given_noise()[:1] + _wrongly_tuned()
     elif case.kind == "matched":
-        chosen = _given_noise() + _shipped() + _baselines(case)
+        chosen = _given_noise() + _shipped() + _baselines()
     else:
-        chosen = _shipped() + _no_change() + _baselines(case)
+        chosen = _shipped() + _no_change() + _baselines()
     return {entrant.name: entrant for entrant in (*chosen, *_CANDIDATES.values())}
 
 
@@ -197,13 +196,10 @@ def _wrongly_tuned() -> list[Entrant]:
     ]
 
 
-def _baselines(case: Case) -> list[Entrant]:
-    settings = {row.name: row.default for row in settings_table()}
-    model = KINDS[case.model].make(settings, case.preload)
+def _baselines() -> list[Entrant]:
     return [
         Entrant(name, f"{baseline.title} ({baseline.source})", False, _always(baseline.run))
         for name, baseline in BASELINES.items()
-        if baseline.handles(model)
     ]
 
 

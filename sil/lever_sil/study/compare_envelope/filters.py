@@ -21,10 +21,9 @@ from scipy.signal import butter, sosfilt, sosfilt_zi
 from ...batch.firmware import PARAMETERS, RESPONSE_STRIDE, Feedthrough, Track
 from ...batch.motions import FREQUENCIES, PERIOD, STRIDE
 from ...batch.sensors import SENSORS
-from ..baselines.joint_ekf import Joint, JointEkf
-from ..baselines.joint_ukf import JointUkf
-from ..baselines.recursion import follow
-from ..data import Batch, Estimates, Truth
+from ..baselines.joint_ekf import joint_ekf
+from ..baselines.joint_ukf import joint_ukf
+from ..data import Batch, Estimates, Estimator, Truth
 from ..matched import KINDS, knowledge
 from ..transitions import dynamics_gradient, with_dynamics
 from .logs import Log
@@ -37,15 +36,15 @@ class JointFilter(NamedTuple):
     """A filter, and whether a high-pass is in front of it."""
 
     title: str
-    filter: type[Joint]
+    run: Estimator
     high_pass: bool
 
 
 JOINT_FILTERS = {
-    "joint_ekf": JointFilter("joint extended Kalman filter", JointEkf, False),
-    "joint_ukf": JointFilter("joint unscented Kalman filter", JointUkf, False),
-    "joint_ekf_hp": JointFilter("joint extended Kalman filter behind a fourth-order high-pass", JointEkf, True),
-    "joint_ukf_hp": JointFilter("joint unscented Kalman filter behind a fourth-order high-pass", JointUkf, True),
+    "joint_ekf": JointFilter("joint extended Kalman filter", joint_ekf, False),
+    "joint_ukf": JointFilter("joint unscented Kalman filter", joint_ukf, False),
+    "joint_ekf_hp": JointFilter("joint extended Kalman filter behind a fourth-order high-pass", joint_ekf, True),
+    "joint_ukf_hp": JointFilter("joint unscented Kalman filter behind a fourth-order high-pass", joint_ukf, True),
 }
 
 
@@ -56,16 +55,13 @@ def tracks(logs: Sequence[Log], joint_filter: JointFilter) -> list[Track]:
     """
     batch = _batch(logs, joint_filter.high_pass)
     at = np.arange(0, batch.samples, STRIDE, dtype=np.int64)
-    whole = _track(batch, follow(joint_filter.filter(batch), at))
+    whole = _track(batch, joint_filter.run(batch, at))
     ends = np.cumsum([len(log.trim) for log in logs]).tolist()
     return [_part(whole, slice(end - len(log.trim), end)) for log, end in zip(logs, ends, strict=True)]
 
 
 def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
-    """Return the batch of all logs side by side.
-
-    Samples come first in memory, since filters go through them one by one.
-    """
+    """Return the batch of all logs side by side."""
     settings = {row.name: row.default for row in settings_table()}
     signals = np.stack([np.concatenate([log.signals[name] for log in logs], axis=1) for name in _SIGNALS], axis=-1)
     trim = np.broadcast_to(np.concatenate([log.trim for log in logs]), signals.shape[:2])
