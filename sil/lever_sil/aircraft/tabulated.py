@@ -83,7 +83,7 @@ class Tabulated:
 
     @property
     def band(self) -> tuple[float, float]:
-        """Where it is known [Hz]: the band of stability.margins()."""
+        """Where it is known [Hz]."""
         return float(self.frequency[0]), float(self.frequency[-1])
 
     def response(self, s: ComplexArray) -> ComplexArray:
@@ -92,10 +92,6 @@ class Tabulated:
         real, imaginary = (np.interp(frequency, self.frequency, part) for part in (self.values.real, self.values.imag))
         response: ComplexArray = real + 1j * imaginary
         return response
-
-    def at(self, frequency: FloatArray) -> ComplexArray:
-        """At other frequencies [Hz], such as the 24 that the firmware takes."""
-        return self.response(2j * np.pi * frequency.astype(np.complex128))
 
 
 def is_response(path: Path) -> bool:

@@ -11,7 +11,6 @@ import numpy as np
 from lever_cdkf.can import codec
 from lever_cdkf.can.commander import Commander
 from lever_cdkf.errors import LeverError
-from lever_cdkf.firmware import quantities
 from lever_cdkf.firmware.aircraft import AircraftResponse
 from lever_cdkf.firmware.estimator import Estimator, Recorder, make_command
 from lever_cdkf.firmware.library import ffi, struct_dtype
@@ -33,46 +32,6 @@ _MESSAGES = {
 }  # fmt: skip
 """That carry what LEVER_SAMPLE does not."""
 _FRAMES_AT_ONCE = 1 << 17
-
-
-@dataclass(frozen=True)
-class FastRun:
-    """What is kept of a run: arrays with a value for each of the times."""
-
-    time: FloatArray
-    """[s]"""
-    truth: Mapping[str, FloatArray]
-    """The true parameters of the pilot by name, natural_frequency [Hz] and damping_ratio [1]; NaN with hands off."""
-    theta: FloatArray
-    """True angle [rad] and rate [rad/s] of the lever."""
-    theta_dot: FloatArray
-    estimate: Mapping[str, FloatArray]
-    """The parameters of the estimator's model by name, natural_frequency and damping_ratio."""
-    sigma: Mapping[str, FloatArray]
-    """Their standard deviations."""
-    nis: FloatArray
-    """Of the sample at that time; chi-square with nis_size degrees of freedom."""
-    nis_size: NDArray[np.uint8]
-    faults: NDArray[np.uint32]
-    """Of enum lever_fault, at that sample."""
-    mode: NDArray[np.uint32]
-    """Of enum lever_mode."""
-    recoveries: int
-    """How often the filter was restarted."""
-
-
-def run(scenario: Scenario, through_frames: bool = False, stride: float = STRIDE) -> FastRun:
-    """Run a scenario against a fresh instance of the firmware, by structs, or through CAN frames with E2E protection.
-
-    By structs values keep their single precision; frames round them as on a bus. What is beyond the range of a frame is
-    not available either way. Raise LeverError, also for a pilot whose plant the C does not have.
-    """
-    inputs = scenario_inputs.prepare(scenario)
-    every = max(1, round(stride / scenario.period))
-    loop = Loop(scenario, inputs, by_frames=through_frames, every=every)
-    loop.advance(len(inputs.time))
-    loop.check()
-    return loop.result()
 
 
 @dataclass(frozen=True)
@@ -227,33 +186,6 @@ class Loop:
     def outputs(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """What is kept of the firmware: arrays of lever_estimate_t and lever_health_t."""
         return self._estimates, self._healths
-
-    def result(self) -> FastRun:
-        """Return what is kept of it."""
-        scenario, inputs, estimates = self._scenario, self._inputs, self._estimates
-        every = self.struct.pointer.stride
-        names = [each.key for each in quantities.parameters(scenario.config.choices["model"])]
-        values, sigma = {}, {}
-        for index, name in enumerate(names):
-            values[name] = estimates["parameter"][:, index].astype(np.float64)
-            sigma[name] = estimates["parameter_sigma"][:, index].astype(np.float64)
-        for name in ("natural_frequency", "damping_ratio"):
-            values[name] = estimates[name].astype(np.float64)
-            sigma[name] = estimates[f"{name}_sigma"].astype(np.float64)
-        truth = inputs.truth.at(slice(None, None, every))
-        return FastRun(
-            time=inputs.time[::every],
-            truth={**truth.parameters, **vars(truth.dynamics)},
-            theta=self.signals["theta"][::every],
-            theta_dot=self.signals["theta_dot"][::every],
-            estimate=values,
-            sigma=sigma,
-            nis=estimates["nis"].astype(np.float64),
-            nis_size=estimates["nis_size"].copy(),
-            faults=self._healths["faults"].copy(),
-            mode=self._healths["mode"].copy(),
-            recoveries=int(self._healths["recoveries"][-1]),
-        )
 
 
 def available(name: str, values: FloatArray) -> FloatArray:

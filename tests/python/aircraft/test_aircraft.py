@@ -8,13 +8,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from lever_cdkf.numeric.arrays import FloatArray
-from lever_sil.aircraft import aircraft, stability
+from lever_sil.aircraft import aircraft
 from lever_sil.aircraft.aircraft import Aircraft, Coupled, Helicopter
 from lever_sil.aircraft.flight import Flight
+from lever_sil.aircraft.stability import Response
 from lever_sil.plants import hysteretic_plant, lever_plant, linear_plant, mayo_plant, two_dof_plant
 from lever_sil.plants.truth import Conditions, Truth
 from lever_sil.toml_tables import ScenarioError
-from python.aircraft.loops import decibels, loop_of
+from python.aircraft.loops import decibels, loop_of, margins, mode
 from python.plants.motion import LEVER, PERIOD, TRIM
 from scipy import integrate
 
@@ -111,7 +112,7 @@ def pilots() -> dict[str, Callable[[int], Truth]]:
     }
 
 
-def loop_with(craft: Aircraft, truth: Truth, gearing: float) -> stability.Response:
+def loop_with(craft: Aircraft, truth: Truth, gearing: float) -> Response:
     return loop_of(Coupled(craft, gearing), truth.transfer(np.array([0])), 0)
 
 
@@ -120,9 +121,9 @@ def loop_with(craft: Aircraft, truth: Truth, gearing: float) -> stability.Respon
 def test_growth_is_that_of_the_linearised_loop(name: str, pilot: str) -> None:
     """10 % beyond the gain margin; growth rate and frequency by linear prediction of the last four seconds."""
     craft, truth = aircraft.load(name), pilots()[pilot]
-    limit = stability.margins(loop_with(craft, truth(2), 1.0))
+    limit = margins(loop_with(craft, truth(2), 1.0))
     beyond = 1.1 * limit.gain
-    root = stability.mode(loop_with(craft, truth(2), beyond), 2j * math.pi * limit.frequency)
+    root = mode(loop_with(craft, truth(2), beyond), 2j * math.pi * limit.frequency)
     theta, _ = coupled_motion(Coupled(craft, beyond), truth(8000), 8000)
     late = theta[4000::20]
     behind, ahead = np.stack((late[1:-1], late[:-2]), axis=1), late[2:]
@@ -136,11 +137,11 @@ def test_growth_is_that_of_the_linearised_loop(name: str, pilot: str) -> None:
 @pytest.mark.parametrize("name", AIRCRAFT)
 def test_the_gain_margin_is_where_the_loop_becomes_unstable(name: str) -> None:
     craft, truth = aircraft.load(name), pilots()["slack arm"](2)
-    limit = stability.margins(loop_with(craft, truth, 1.0))
+    limit = margins(loop_with(craft, truth, 1.0))
     guess = 2j * math.pi * limit.frequency
-    assert stability.mode(loop_with(craft, truth, 0.99 * limit.gain), guess).real < 0.0
-    assert stability.mode(loop_with(craft, truth, 1.01 * limit.gain), guess).real > 0.0
-    half = stability.margins(loop_with(craft, truth, 0.5 * limit.gain))
+    assert mode(loop_with(craft, truth, 0.99 * limit.gain), guess).real < 0.0
+    assert mode(loop_with(craft, truth, 1.01 * limit.gain), guess).real > 0.0
+    half = margins(loop_with(craft, truth, 0.5 * limit.gain))
     assert half.gain == pytest.approx(2.0, rel=1e-6)
     assert decibels(half.gain) == pytest.approx(6.02, abs=0.01)
     assert 0.0 < half.modulus < 0.501  # at the crossing 1 - L is 1/2

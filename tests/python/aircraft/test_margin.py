@@ -11,12 +11,12 @@ from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.aircraft import AircraftResponse, Stability
 from lever_cdkf.firmware.native import Config, Estimator
 from lever_cdkf.numeric.arrays import FloatArray
-from lever_sil.aircraft import aircraft, stability
+from lever_sil.aircraft import aircraft
 from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.aircraft.flight import Flight
 from lever_sil.plants import lever_plant
 from lever_sil.scenarios import inputs, scenario
-from python.aircraft.loops import decibels, loop_of
+from python.aircraft.loops import Margins, decibels, loop_of, margins
 from python.plants.motion import TRIM
 
 NAMES = ("m_p", "c_p", "k_p")
@@ -41,12 +41,12 @@ def said(arm: FloatArray, sigma: float, watched: AircraftResponse) -> Stability:
     return estimator.stability()
 
 
-def expected(arm: FloatArray, coupled: Coupled, factor: complex = 1.0) -> stability.Margins:
+def expected(arm: FloatArray, coupled: Coupled, factor: complex = 1.0) -> Margins:
     columns = (np.full(1, value) for value in (*arm, TRIM))
     transfer = lever_plant.LeverTruth(LEVER, lever_plant.Truth(*columns), "trim").transfer(np.array([0]))
 
     loop = loop_of(coupled, transfer, 0)
-    return stability.margins(lambda s: factor * loop(s))
+    return margins(lambda s: factor * loop(s))
 
 
 @pytest.mark.parametrize("name", aircraft.names())
@@ -56,13 +56,13 @@ def test_margins_are_those_of_the_linearised_loop(name: str) -> None:
     for _ in range(30):
         arm = random.uniform((1.5, 15.0, 800.0), (4.5, 90.0, 3000.0))
         coupled = Coupled(craft, random.uniform(0.2, 1.2))
-        margins, found = expected(arm, coupled), said(arm, 1e-3, table(coupled))
-        assert 2.0 < margins.frequency < 7.0
-        assert found.gain_margin == pytest.approx(decibels(margins.gain), abs=0.1)
-        assert found.frequency == pytest.approx(margins.frequency, rel=0.005)
-        if 0.0 < decibels(margins.gain) < 10.0:
-            assert found.modulus == pytest.approx(margins.modulus, abs=0.02)
-        elif decibels(margins.gain) < 0.0:
+        known, found = expected(arm, coupled), said(arm, 1e-3, table(coupled))
+        assert 2.0 < known.frequency < 7.0
+        assert found.gain_margin == pytest.approx(decibels(known.gain), abs=0.1)
+        assert found.frequency == pytest.approx(known.frequency, rel=0.005)
+        if 0.0 < decibels(known.gain) < 10.0:
+            assert found.modulus == pytest.approx(known.modulus, abs=0.02)
+        elif decibels(known.gain) < 0.0:
             assert found.modulus < 0.0
 
 
@@ -81,7 +81,7 @@ def test_standard_deviations_are_those_of_drawn_arms() -> None:
 @pytest.mark.requirement("R42")
 def test_what_the_table_is_off_by_is_in_the_standard_deviations() -> None:
     arm, coupled = np.array((2.5, 30.0, 1500.0)), Coupled(aircraft.load("uh60_like"), 0.5)
-    exact, margins = said(arm, 1e-3, table(coupled)), expected(arm, coupled)
+    exact, known = said(arm, 1e-3, table(coupled)), expected(arm, coupled)
     gain = said(arm, 1e-3, table(coupled, gain_sigma=0.1))
     assert exact.gain_margin_sigma < 0.02
     assert gain.gain_margin_sigma == pytest.approx(decibels(1.1), rel=0.01)
@@ -89,9 +89,9 @@ def test_what_the_table_is_off_by_is_in_the_standard_deviations() -> None:
     rotated = expected(arm, coupled, complex(1.0, 0.1))
     of_gain = math.sqrt(phase.gain_margin_sigma**2 - exact.gain_margin_sigma**2)
     of_frequency = math.sqrt(phase.frequency_sigma**2 - exact.frequency_sigma**2)
-    moved = abs(decibels(rotated.gain) - decibels(margins.gain))
+    moved = abs(decibels(rotated.gain) - decibels(known.gain))
     assert of_gain == pytest.approx(moved, abs=0.02)  # the table is linear between
-    assert of_frequency == pytest.approx(abs(rotated.frequency - margins.frequency), rel=0.05)
+    assert of_frequency == pytest.approx(abs(rotated.frequency - known.frequency), rel=0.05)
 
 
 @pytest.mark.requirement("R43")
@@ -104,7 +104,7 @@ def test_the_alarm_comes_before_the_vibration_grows() -> None:
     body = known.truth.body(inputs.conditions(wanted, known))
     firmware.watch(table(wanted.aircraft, 0.05, 0.05, warning=3.0, alarm=1.5))
     noise = np.random.default_rng(5).standard_normal((len(z_ddot), 4)) * (1e-3, 1e-2, 2e-3, 1e-2)
-    rest, states, margins = body.theta, [], []
+    rest, states, stated = body.theta, [], []
     z_ddot[0] = flight.z_ddot
     for sample in range(len(z_ddot) - 1):
         if sample % 500 == 0:
@@ -114,15 +114,13 @@ def test_the_alarm_comes_before_the_vibration_grows() -> None:
         if sample % 20 == 0:
             said_now = firmware.stability()
             states.append(said_now.state)
-            margins.append((said_now.gain_margin, said_now.gain_margin_sigma))
+            stated.append((said_now.gain_margin, said_now.gain_margin_sigma))
         z_ddot[sample + 1] = flight.advance(body.theta - rest)
         body.advance(firmware.health().torque)
     at = np.arange(0, len(z_ddot) - 1, 20)
     transfer = known.truth.transfer(at)
-    true = np.array(
-        [decibels(stability.margins(loop_of(wanted.aircraft, transfer, i)).gain) for i in range(0, len(at), 10)]
-    )
-    gain, sigma = np.array(margins).T[:, ::10]
+    true = np.array([decibels(margins(loop_of(wanted.aircraft, transfer, i)).gain) for i in range(0, len(at), 10)])
+    gain, sigma = np.array(stated).T[:, ::10]
     judged = (at[::10] > 5000) & (true > -1.0)
     assert np.mean(np.abs(gain - true)[judged] < 2.0 * sigma[judged]) > 0.9
     assert np.sqrt(np.mean((gain - true)[judged] ** 2)) < 1.0

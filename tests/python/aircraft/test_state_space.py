@@ -22,7 +22,7 @@ from lever_sil.plants.truth import Truth
 from lever_sil.scenarios import inputs as scenario_inputs
 from lever_sil.scenarios.scenario import load as load_scenario
 from lever_sil.toml_tables import ScenarioError
-from python.aircraft.loops import decibels, loop_of
+from python.aircraft.loops import decibels, loop_of, margins
 from python.plants.motion import LEVER, TRIM, columns
 from scipy import io, linalg, signal
 
@@ -152,7 +152,7 @@ def test_the_critical_gearing_is_that_of_the_eigenvalues(name: str, modes: list[
     craft = aircraft.load(name, **({"mode": modes} if modes else {}))
     expected = critical_by_eigenvalues(craft, arm())
     transfer = arm().transfer(np.array([0]))
-    assert stability.margins(loop_of(Coupled(craft, 1.0), transfer, 0)).gain == pytest.approx(expected, rel=1e-4)
+    assert margins(loop_of(Coupled(craft, 1.0), transfer, 0)).gain == pytest.approx(expected, rel=1e-4)
     assert stability.critical_gearing(craft, transfer)[0] == pytest.approx(expected, rel=2e-3)
 
 
@@ -164,7 +164,7 @@ def test_mayos_pilots_bounce_where_people_did() -> None:
         for somatotype in ("ectomorphic", "mesomorphic"):
             truth = mayo_plant.Mayo(mayo_plant.HANDS[somatotype], 0.45, np.full(2, TRIM))
             loop = loop_of(Coupled(aircraft.load(name), 1.0), truth.transfer(np.array([0])), 0)
-            found = stability.margins(loop)
+            found = margins(loop)
             cells.append(f"{found.frequency:.2f} Hz, {found.gain:.2f}")
         assert f"| `{name}` | {' | '.join(cells)} |" in said
 
@@ -335,7 +335,7 @@ def test_a_response_is_fitted_and_flies(
     written(path, craft, 0.5, noise, seat=bool(modes))
     fitted = aircraft.load(str(path), response_gearing="0.5 1", delay="20 ms")
     transfer = arm().transfer(np.array([0]))
-    known, found = (stability.margins(loop_of(Coupled(each, 1.0), transfer, 0), (1.5, 8.0)) for each in (craft, fitted))
+    known, found = (margins(loop_of(Coupled(each, 1.0), transfer, 0), (1.5, 8.0)) for each in (craft, fitted))
     assert found.gain == pytest.approx(known.gain, rel=within)
     assert fitted.airframe().poles().real.max() < 0.0
     if modes and not noise:
@@ -363,6 +363,6 @@ def test_a_table_shows_the_mode_between_its_frequencies(name: str) -> None:
     points = [list(getattr(table, part))[: table.count] for part in ("frequency", "real", "imaginary")]
     tabulated = Tabulated(np.array(points[0]), np.array(points[1]) + 1j * np.array(points[2]))
     loops = (loop_of(each, transfer, 0) for each in (Coupled(craft, 1.0), tabulated))
-    known, found = (stability.margins(loop, (1.5, 8.0)) for loop in loops)
+    known, found = (margins(loop, (1.5, 8.0)) for loop in loops)
     assert decibels(found.gain) == pytest.approx(decibels(known.gain), abs=0.5)
     assert found.frequency == pytest.approx(known.frequency, rel=0.02)

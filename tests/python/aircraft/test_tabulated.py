@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lever_cdkf.errors import LeverError
-from lever_sil.aircraft import aircraft, stability
+from lever_sil.aircraft import aircraft
 from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.aircraft.tabulated import Tabulated
 from lever_sil.commands.aircraft import response
 from lever_sil.plants import lever_plant
-from python.aircraft.loops import decibels, loop_of
+from python.aircraft.loops import decibels, loop_of, margins
 from python.plants.motion import LEVER, TRIM, columns
 
 FREQUENCY = np.geomspace(1.0, 10.0, 60)
@@ -33,7 +33,7 @@ def test_its_margins_are_those_of_the_aircraft_it_is_of(file: Path) -> None:
     transfer = lever_plant.LeverTruth(LEVER, lever_plant.Truth(*columns(1, 2.5, 25.0, 1500.0, TRIM)), "trim").transfer(
         np.array([0])
     )
-    known, found = (stability.margins(loop_of(each, transfer, 0), tabulated.band) for each in (coupled, tabulated))
+    known, found = (margins(loop_of(each, transfer, 0), tabulated.band) for each in (coupled, tabulated))
     assert tabulated.band == pytest.approx((1.0, 10.0))
     assert decibels(found.gain) == pytest.approx(decibels(known.gain), abs=0.05)
     assert found.frequency == pytest.approx(known.frequency, rel=2e-3)

@@ -19,11 +19,11 @@ from lever_cdkf.firmware.settings_file import format_config
 from lever_cdkf.watch import panels, status
 from lever_cdkf.watch.picture import Picture
 from lever_cdkf.watch.sources import LogSource
-from lever_sil.aircraft import aircraft, stability
+from lever_sil.aircraft import aircraft
 from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.commands.aircraft import response
 from lever_sil.scenarios import scenario
-from python.aircraft.loops import decibels, loop_of
+from python.aircraft.loops import decibels, loop_of, margins
 from python.conftest import Refused, Run, Session
 from python.report.reading import figures, read
 
@@ -119,7 +119,7 @@ def test_a_simulation_knows_the_true_margin(flown: Path) -> None:
     trace = np.genfromtxt(flown / "sim" / "trace.csv", delimiter=",", names=True)
     coupled = Coupled(aircraft.load("uh60_like"), 0.5)
     truth = scenario.load("bounce", ["pilot.c_p=30 N s/m"]).truth(np.zeros(1))
-    expected = decibels(stability.margins(loop_of(coupled, truth.transfer(np.array([0])), 0)).gain)
+    expected = decibels(margins(loop_of(coupled, truth.transfer(np.array([0])), 0)).gain)
     assert trace["gain_margin_true_dB"] == pytest.approx(expected, abs=0.02)
     assert trace["gain_margin_dB"][-1] == pytest.approx(expected, abs=3.0 * trace["gain_margin_sigma_dB"][-1])
 

@@ -1,4 +1,4 @@
-"""The flights of `lever bounce` against stability.margins() and closed forms."""
+"""The flights of `lever bounce` against margins() and closed forms."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.bounce import flights, measure, pilots
 from lever_sil.bounce.flights import AIRCRAFT, Plan
 from lever_sil.scenarios import inputs
-from python.aircraft.loops import loop_of
+from python.aircraft.loops import loop_of, margins
 
 
 @pytest.mark.parametrize("craft", AIRCRAFT)
@@ -25,7 +25,7 @@ def test_the_critical_gearing_is_that_of_the_margins(craft: str) -> None:
     transfer = flights.truth_of(plan).transfer(np.array([0, 1500, 2999]))
     found = stability.critical_gearing(aircraft.load(craft), transfer)
     loops = (loop_of(Coupled(aircraft.load(craft), 1.0), transfer, row) for row in range(3))
-    assert found == pytest.approx([stability.margins(loop).gain for loop in loops], rel=2e-3)  # 0.02 dB
+    assert found == pytest.approx([margins(loop).gain for loop in loops], rel=2e-3)  # 0.02 dB
 
 
 @pytest.mark.parametrize(("until", "expected"), [(1.5, 1.0), (2.5, 4.0), (5.0, 4.0), (6.0, math.inf)])

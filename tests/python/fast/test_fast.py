@@ -12,7 +12,6 @@ from lever_cdkf.can.bus import LeverBus
 from lever_cdkf.can.commander import KEEP, Commander
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.native import lib, run_samples
-from lever_sil import fast
 from lever_sil.aircraft import aircraft
 from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.aircraft.flight import Flight
@@ -23,6 +22,7 @@ from lever_sil.fast.library import lib as loop_lib
 from lever_sil.run import in_process, loop
 from lever_sil.scenarios import inputs, scenario
 from lever_sil.scenarios.scenario import Scenario
+from python.fast.flown import fly
 
 SAME = 1e-9
 """[rad], [rad/s]: the C and Python may have different sines."""
@@ -45,7 +45,7 @@ def python_run(wanted: Scenario) -> loop.Recording:
 @pytest.mark.parametrize("name", scenario.names())
 def test_the_lever_moves_as_in_python_whoever_holds_it(name: str) -> None:
     wanted = scenario.load(name, ["duration=3 s"])
-    slow, quick = python_run(wanted), fast.run(wanted, through_frames=True, stride=wanted.period)
+    slow, quick = python_run(wanted), fly(wanted, by_frames=True, stride=wanted.period)
     assert np.abs(quick.theta - slow.theta).max() < SAME
     assert np.abs(quick.theta_dot - slow.theta_dot).max() < SAME
 
@@ -65,14 +65,14 @@ def test_an_aircraft_flies_as_in_python(period: float) -> None:
 
 def test_sensors_that_are_late_and_wrong_read_as_in_python() -> None:
     wanted = scenario.load("steady", ["duration=3 s", *LATE_AND_WRONG])
-    slow, quick = python_run(wanted), fast.run(wanted, through_frames=True, stride=wanted.period)
+    slow, quick = python_run(wanted), fly(wanted, by_frames=True, stride=wanted.period)
     assert np.abs(quick.theta - slow.theta).max() < SAME  # dither, of the firmware, depends on what it is told
 
 
 def test_by_structs_the_firmware_gets_what_the_sensors_read() -> None:
     wanted = scenario.load("base_only", ["duration=3 s"])
     known, every = inputs.prepare(wanted), 20
-    quick = fast.run(wanted, stride=wanted.period)
+    quick = fly(wanted, stride=wanted.period)
     assert np.abs(quick.theta - python_run(wanted).theta).max() < SAME
     offsets = {name: inputs.readings(wanted, known, name).offsets for name in ("theta", "theta_dot", "tau_m")}
     samples = {
@@ -84,7 +84,7 @@ def test_by_structs_the_firmware_gets_what_the_sensors_read() -> None:
     }
     at = np.arange(0, len(known.time), every)
     expected = run_samples(wanted.config, samples, at)
-    run = fast.run(wanted, stride=every * wanted.period)
+    run = fly(wanted, stride=every * wanted.period)
     assert np.array_equal(run.time, known.time[at])
     for index, name in enumerate(("m_p", "c_p", "k_p")):
         assert np.array_equal(run.estimate[name], expected["parameter"][:, index])
@@ -124,7 +124,7 @@ def test_what_is_beyond_the_range_of_a_frame_is_not_available_by_structs_either(
     ]
     wanted = scenario.load("steady", ["duration=3 s", "limits={}", *sensors])
     missing = lib.LEVER_FAULT_THETA | lib.LEVER_FAULT_THETA_DOT | lib.LEVER_FAULT_TORQUE
-    by_structs, by_frames = (fast.run(wanted, through_frames, stride=1e-3) for through_frames in (False, True))
+    by_structs, by_frames = (fly(wanted, framed, stride=1e-3) for framed in (False, True))
     assert np.array_equal(by_structs.faults & missing, by_frames.faults & missing)
     assert all((by_structs.faults & fault).any() for fault in (missing, lib.LEVER_FAULT_BASE))
 
@@ -153,7 +153,7 @@ def test_a_command_that_is_refused_ends_the_run(monkeypatch: pytest.MonkeyPatch)
         in_process.run(wanted)
     monkeypatch.setattr(inputs, "commands", lambda *_: {0: {"request": "reset", "dither_rms": -1.0}})
     with pytest.raises(LeverError, match="refuses COMMAND"):
-        fast.run(wanted)
+        fly(wanted)
 
 
 def test_who_has_no_plant_in_c_runs_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -162,4 +162,4 @@ def test_who_has_no_plant_in_c_runs_in_python(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(plants, "has", lambda _: False)
     assert in_process.run(wanted).frames().data.tobytes() == quick.frames().data.tobytes()
     with pytest.raises(LeverError, match="in Python only"):
-        fast.run(wanted)
+        fly(wanted)

@@ -11,9 +11,9 @@ import pytest
 from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
 from lever_cdkf.cli.main import main
-from lever_sil import fast
 from lever_sil.run import in_process
 from lever_sil.scenarios.scenario import Scenario, load
+from python.fast.flown import fly
 from python.fmu.importer import Instance, Loop, unpacked
 
 ESTIMATES = ("m_p", "c_p", "k_p", "natural_frequency", "damping_ratio")
@@ -39,7 +39,7 @@ def compared(scenario: Scenario, loop: Loop) -> list[str]:
         loop.step()
         estimate[sample] = loop.controller.slave.getFloat64(estimated)
     recording = in_process.run(scenario)
-    wanted = fast.run(scenario, through_frames=True, stride=scenario.period)
+    wanted = fly(scenario, by_frames=True, stride=scenario.period)
     columns = {name: (true[:, i], getattr(recording, name.removeprefix("true_"))) for i, name in enumerate(TRUE)}
     for i, name in enumerate(ESTIMATES):
         columns[name] = (estimate[:, i], wanted.estimate[name])
