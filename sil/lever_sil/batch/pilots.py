@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.firmware.config import Config
 from lever_cdkf.numeric.arrays import FloatArray
 
 from ..fast import plants as fast_plants
@@ -38,7 +38,7 @@ def record(motion: Motion, seeds: Sequence[int], tick: Callable[[], None] = lamb
 
 def _pilot(name: str, seed: int, ones: FloatArray) -> Truth:
     """Return the pilot of that name; `ones` has a value for each sample."""
-    lever = lever_plant.Lever.from_settings({row.name: row.default for row in settings_table()})
+    lever = lever_plant.Lever.from_settings(Config().settings)
     m_p, c_p, k_p, trim = (values[0, 0] * ones for values in arms([seed]))
     rng = stream("pilot", seed)
     if name == "hysteretic":

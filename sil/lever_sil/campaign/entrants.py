@@ -14,8 +14,8 @@ from ..measures import covariance_of, is_flagged
 from ..scenarios.scenario import Scenario
 from ..study.baselines import BASELINES
 from ..study.data import PARAMETERS, Batch, Estimates, Truth
-from ..study.detrended import detrended
-from ..study.matched import KINDS, knowledge
+from ..study.detrended import measured
+from ..study.matched import KINDS
 from ..study.transitions import dynamics_gradient, with_dynamics
 from .flight import Columns, Flight, beside
 
@@ -134,15 +134,13 @@ class Published(Entrant):
 
 
 def _batch(flights: Sequence[Flight]) -> Batch:
-    first = flights[0]
-    settings, choices = first.scenario.config.settings, first.scenario.config.choices
-    kind = KINDS[choices["model"]]
-    raw_y = np.stack((beside(flights, "theta"), beside(flights, "theta_dot")), axis=-1)
-    raw_u = np.stack((beside(flights, "z_ddot"), beside(flights, "tau_m")), axis=-1)
+    config = flights[0].scenario.config
+    y, u = (
+        np.stack([beside(flights, name) for name in names], axis=-1)
+        for names in (("theta", "theta_dot"), ("z_ddot", "tau_m"))
+    )
     nothing = Truth(np.empty(0), None, np.empty(0))
-    model, trim = kind.make(settings, choices["preload"]), np.zeros(raw_y.shape[:2])
-    batch = Batch(model, first.scenario.period, raw_y, raw_u, trim, knowledge(settings, kind), nothing, raw_y, raw_u)
-    return detrended(batch, settings["trim_corner"], settings["align_time"])
+    return measured(config.settings, config.choices["model"], config.choices["preload"], (y, u), nothing)
 
 
 def _of_estimates(batch: Batch, estimates: Estimates) -> Track:

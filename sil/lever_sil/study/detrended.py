@@ -8,24 +8,45 @@ dynamics.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from lever_cdkf.models.detrend import DAMPING
 from lever_cdkf.numeric.arrays import Array
 
-from .data import OUTPUTS, Batch
+from .data import OUTPUTS, Batch, Knowledge, Truth
+from .matched import KINDS, knowledge
 
 
-def detrended(batch: Batch, corner: float, align_time: float) -> Batch:
+def measured(
+    settings: Mapping[str, float],
+    model: str,
+    preload: str,
+    signals: tuple[Array, Array],
+    truth: Truth,
+    known: Knowledge | None = None,
+) -> Batch:
+    """Return runs of measured outputs and inputs, (B, K, 2) each, detrended with preload `trim`.
+
+    Estimators are told what the settings say, unless it is something else that is `known`.
+    """
+    kind, (y, u) = KINDS[model], signals
+    told = known or knowledge(settings, kind)
+    trim = np.zeros(y.shape[:2])
+    batch = Batch(kind.make(settings, preload), settings["sample_period"], y, u, trim, told, truth, y, u)
+    return detrended(batch, settings) if preload == "trim" else batch
+
+
+def detrended(batch: Batch, settings: Mapping[str, float]) -> Batch:
     """Return the batch with y, u and trim made of raw_y and raw_u.
 
-    `corner` is in Hz; theta is at first a mean of align_time [s].
+    Their slow part is what is below `trim_corner`; theta is at first a mean of `align_time`.
     """
     signals = np.concatenate((batch.raw_y, batch.raw_u), axis=2)
     start = np.zeros((batch.runs, signals.shape[2]))
-    start[:, 0] = batch.raw_y[:, : max(1, round(align_time / batch.period)), 0].mean(axis=1)
-    deviation, level = deviations(signals, start, corner, batch.period)
+    start[:, 0] = batch.raw_y[:, : max(1, round(settings["align_time"] / batch.period)), 0].mean(axis=1)
+    deviation, level = deviations(signals, start, settings["trim_corner"], batch.period)
     return replace(batch, y=deviation[..., :OUTPUTS], u=deviation[..., OUTPUTS:], trim=level[..., 0])
 
 

@@ -33,20 +33,22 @@ class Firmware:
     def __call__(self, batch: Batch, at: NDArray[np.int64]) -> Estimates:
         """Run the firmware over a batch; report at the samples `at`."""
         config = Config(self.model, self.preload, self.estimator, self.adaptation, settings=EXACT | dict(self.settings))
-        time_us = np.arange(batch.samples, dtype=np.int64) * round(batch.period * 1e6)
-        runs = [
-            run_samples(
-                config,
-                {"time_us": time_us, "theta": y[:, 0], "theta_dot": y[:, 1], "z_ddot": u[:, 0], "tau_m": u[:, 1]},
-                at,
-            )
-            for y, u in zip(batch.raw_y, batch.raw_u, strict=True)
-        ]
+        runs = [run_of(config, batch, run, at) for run in range(batch.runs)]
         columns = {name: np.stack([run[name] for run in runs]).astype(np.float64) for name in _COLUMNS}
         w = np.where(columns["recoveries"][..., None] > 0.0, np.nan, batch.knowledge.scaled(columns["parameter"]))
         scale = columns["parameter"] if batch.knowledge.positive else batch.knowledge.sigma
         sigma = columns["parameter_sigma"] / scale
         return Estimates(at, w, covariance_of(sigma, columns["parameter_correlation"]), columns["nis"])
+
+
+def run_of(
+    config: Config, batch: Batch, run: int, at: NDArray[np.int64] | None = None
+) -> dict[str, NDArray[np.generic]]:
+    """Return columns of lever_estimate_t after the samples `at` of a run, after all of them by default."""
+    (theta, theta_dot), (z_ddot, tau_m) = batch.raw_y[run].T, batch.raw_u[run].T
+    time_us = np.arange(batch.samples, dtype=np.int64) * round(batch.period * 1e6)
+    samples = {"time_us": time_us, "theta": theta, "theta_dot": theta_dot, "z_ddot": z_ddot, "tau_m": tau_m}
+    return run_samples(config, samples, at)
 
 
 _COLUMNS = ("parameter", "parameter_sigma", "parameter_correlation", "nis", "recoveries")

@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from lever_cdkf.firmware.config import setting, settings_table
+from lever_cdkf.firmware.config import Config, setting
 from lever_cdkf.models.lever import Lever
 from lever_cdkf.models.linear import LinearBlackBox, LinearPhysical
 from lever_cdkf.numeric.arrays import Array
@@ -47,6 +47,12 @@ KINDS: Mapping[str, Kind] = {
     "linear_black_box": Kind(LinearBlackBox.from_settings, ("a21", "a22", "b21"), False),
 }
 """By the names of the firmware's models."""
+PRIOR: Mapping[str, Mapping[str, float]] = {
+    "lever": {"m_p_sigma": 0.25, "c_p_sigma": 0.3, "k_p_sigma": 0.3},
+    "linear_physical": {"m_sigma": 0.25, "c_sigma": 0.3, "k_sigma": 0.3},
+    "linear_black_box": {},
+}
+"""By model, of comparisons and figures: a first guess that is wrong by a quarter to a third, as in the scenarios."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +78,7 @@ class Condition:
         """Return every setting. Raises SettingsError for one that the firmware would not take."""
         for name, value in self.settings.items():
             setting(name).check(value)
-        settings = {row.name: row.default for row in settings_table()} | dict(self.settings)
+        settings = Config().settings | dict(self.settings)
         if settings["theta_process_noise"] != 0.0:
             raise ValueError("theta_process_noise must be 0: the truth has none")
         return settings

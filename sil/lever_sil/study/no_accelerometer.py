@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.cli.tables import Cell, Row
-from lever_cdkf.firmware.config import setting, settings_table
+from lever_cdkf.firmware.config import setting
 from lever_cdkf.firmware.native import Config, lib, run_samples
 from lever_cdkf.models.lever import Lever
 from lever_cdkf.numeric.arrays import Array
@@ -83,7 +83,7 @@ def assumptions(base: str) -> dict[str, tuple[Spectrum, tuple[float, ...]]]:
 
 def runs(base: str, count: int, duration: float) -> tuple[Array, Array, Array]:
     """Return measured theta, theta_dot (N, K, 2), base acceleration (N, K), and the true f_n [Hz] and zeta (N, 2)."""
-    settings = {row.name: row.default for row in settings_table()}
+    settings = Config().settings
     lever, period = Lever.from_settings(settings, "trim"), settings["sample_period"]
     drawn, time = streams(1, count), np.arange(round(duration / period), dtype=np.float64) * period
     z_ddot = np.stack([BASES[base].samples(time, own["base"]) for own in drawn])
@@ -105,7 +105,7 @@ def runs(base: str, count: int, duration: float) -> tuple[Array, Array, Array]:
 
 def likeliest(y: Array, truth: Array, spectrum: Spectrum, start: tuple[float, ...]) -> Found:
     """Return what the runs y (N, K, 2) tell under an assumption, against the truth (N, 2)."""
-    settings = {row.name: row.default for row in settings_table()}
+    settings = Config().settings
     noise = np.array((settings["theta_noise"], settings["theta_dot_noise"]))
     centred, period = y - y.mean(axis=1, keepdims=True), settings["sample_period"]
     found = [_fit(*_periodogram(run, noise, period), spectrum, start) for run in centred]

@@ -18,8 +18,7 @@ from ..run.columns import columns_of
 from ..scenarios.scenario import Scenario, load
 from ..toml_tables import ScenarioError
 from .data import Batch, Truth
-from .detrended import detrended
-from .matched import KINDS, knowledge
+from .detrended import measured
 
 _MEASURED_Y = ("theta_measured_rad", "theta_dot_measured_rad_s")
 _MEASURED_U = ("z_ddot_measured_m_s2", "tau_m_measured_N_m")
@@ -43,15 +42,12 @@ def recorded(name: str, runs: int, seed: int, duration: float | None = None) -> 
         raise ScenarioError(f"{first.file}: has dropouts; an estimator of a study needs every sample")
     traces = [_run(scenario) for scenario in scenarios]
     settings, choices = first.config.settings, first.config.choices
-    kind = KINDS[choices["model"]]
-    raw_y, raw_u = _columns(traces, _MEASURED_Y), _columns(traces, _MEASURED_U)
+    signals = (_columns(traces, _MEASURED_Y), _columns(traces, _MEASURED_U))
     parameters = [quantity.column("true") for quantity in quantities.parameters(choices["model"])]
     has_parameters = set(parameters) <= traces[0].keys()  # a pilot who is none of the model has no such parameters
     dynamics = _columns(traces, [quantity.column("true") for quantity in quantities.DYNAMICS])
     truth = Truth(_columns(traces, _STATES), _columns(traces, parameters) if has_parameters else None, dynamics)
-    model, trim = kind.make(settings, choices["preload"]), np.zeros(raw_y.shape[:2])
-    batch = Batch(model, first.period, raw_y, raw_u, trim, knowledge(settings, kind), truth, raw_y, raw_u)
-    return detrended(batch, settings["trim_corner"], settings["align_time"]) if model.preload == "trim" else batch
+    return measured(settings, choices["model"], choices["preload"], signals, truth)
 
 
 def _run(scenario: Scenario) -> Trace:

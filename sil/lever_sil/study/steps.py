@@ -10,15 +10,15 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.firmware.config import Config
 from lever_cdkf.models.lever import Lever
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.text.units import GRAVITY
 
 from .data import OUTPUTS, PARAMETERS, Batch, Truth
-from .detrended import detrended
+from .detrended import measured
 from .draws import excitation, streams
-from .matched import KINDS, knowledge
+from .matched import KINDS
 
 LONGEST_SUBSTEP = 0.5e-3
 """[s]; second order: at 4 Hz the frequency is then right to 1e-5."""
@@ -52,9 +52,8 @@ class Step:
 
 def stepped(step: Step, runs: int, seed: int) -> Batch:
     """Return `runs` runs, detrended; run i is the same, to the bit, whatever `runs` is."""
-    settings = {row.name: row.default for row in settings_table()} | {"theta_dot_process_noise": step.process_noise}
-    kind, lever, period = KINDS[step.model], Lever.from_settings(settings, "trim"), settings["sample_period"]
-    assumed = knowledge(settings, kind)
+    settings = Config().settings | {"theta_dot_process_noise": step.process_noise}
+    lever, period = Lever.from_settings(settings, "trim"), settings["sample_period"]
     drawn_from = streams(seed, runs)
     time = np.arange(max(2, round(step.duration / period)), dtype=np.float64) * period
 
@@ -67,13 +66,11 @@ def stepped(step: Step, runs: int, seed: int) -> Batch:
     kick = step.process_noise * math.sqrt(period / substeps)
     kicks = np.stack([kick * own["process"].standard_normal((len(time) - 1, substeps)) for own in drawn_from])
     x = follow(lever, p, u, step.trim, kicks, period)
-    noise = np.stack([own["output"].standard_normal((len(time), OUTPUTS)) for own in drawn_from])
-    raw_y = x + assumed.output_noise * noise
+    white = np.stack([own["output"].standard_normal((len(time), OUTPUTS)) for own in drawn_from])
+    y = x + np.array((settings["theta_noise"], settings["theta_dot_noise"])) * white
     dynamics = np.moveaxis(lever.dynamics(np.moveaxis(p, -1, 0), step.trim), 0, -1)
     truth = Truth(x, p if step.model == "lever" else None, dynamics)
-    trim = np.full(raw_y.shape[:2], step.trim)
-    measured = Batch(kind.make(settings, "trim"), period, raw_y, u, trim, assumed, truth, raw_y, u)
-    return detrended(measured, settings["trim_corner"], settings["align_time"])
+    return measured(settings, step.model, "trim", (y, u), truth)
 
 
 def follow(lever: Lever, p: Array, u: Array, trim: float, kicks: Array, period: float) -> Array:

@@ -221,8 +221,8 @@ def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Copy:
     )
     project.change(
         "sil/lever_sil/study/compare/cases.py",
-        "def _wrong_noise() -> Iterator[Case]:\n",
-        'def _wrong_noise() -> Iterator[Case]:\n    yield WrongNoise(name="wronger", title="wronger")\n',
+        "def _steps() -> Iterator[Case]:\n",
+        'def _steps() -> Iterator[Case]:\n    yield Matched(name="wronger", title="wronger", kind="wrong noise")\n',
     )
     clock = "    clock = readings.clock\n"
     project.change("sil/lever_sil/faults/rows.py", clock, f'    yield Row("sulk", "it sulks")\n{clock}')

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
 import numpy as np
-from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.firmware.config import Config
 from lever_cdkf.numeric.arrays import Array, BoolArray
 from numpy.typing import NDArray
 
@@ -16,16 +16,9 @@ from ...scenarios import scenario as scenarios
 from .. import bound, linearised
 from ..data import Batch
 from ..detrended import detrended
-from ..matched import KINDS, Condition, jump, knowledge, matched, tightened
+from ..matched import KINDS, PRIOR, Condition, jump, knowledge, matched, tightened
 from ..recorded import recorded, usable
 from ..steps import Step, stepped
-
-PRIOR: Mapping[str, Mapping[str, float]] = {
-    "lever": {"m_p_sigma": 0.25, "c_p_sigma": 0.3, "k_p_sigma": 0.3},
-    "linear_physical": {"m_sigma": 0.25, "c_sigma": 0.3, "k_sigma": 0.3},
-    "linear_black_box": {},
-}
-"""Of the matched runs: the first guess is wrong by a quarter to a third, as in the shipped scenarios."""
 
 QUIET, ROUGH = 0.01, 0.1
 """Low and high process noise [rad/s/√s]."""
@@ -141,8 +134,7 @@ class Matched(Case):
         exact = self._exact(plan)
         if self.preload == "fixed":
             return exact
-        defaults = {row.name: row.default for row in settings_table()}
-        return detrended(exact, defaults["trim_corner"], defaults["align_time"])
+        return detrended(exact, Config().settings)
 
     def judged(self, time: Array, plan: Plan) -> BoolArray:
         """Return True from 15 s on, scaled to the length of the plan."""
@@ -161,20 +153,6 @@ class Matched(Case):
             self.model, self.preload, dither_rms=self.dither_rms, settings={**self.own_settings, **self.noise}
         )
         return matched(condition, self.runs(plan), self.length(plan), plan.seed)
-
-
-@dataclass(frozen=True, kw_only=True)
-class WrongNoise(Matched):
-    """A matched case for firmware that is told wrong noise."""
-
-    kind: str = "wrong noise"
-
-
-@dataclass(frozen=True, kw_only=True)
-class WrongTuning(Matched):
-    """A matched case for firmware whose noise, first uncertainty or walk is wrong, alone and in pairs."""
-
-    kind: str = "wrong tuning"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,7 +210,7 @@ class Paper(Case):
     @property
     def noise(self) -> Mapping[str, float]:
         """The measurement and process noise of the case, as settings."""
-        defaults = {row.name: row.default for row in settings_table()}
+        defaults = Config().settings
         outputs = {name: self.output_noise * defaults[name] for name in ("theta_noise", "theta_dot_noise")}
         return {**outputs, "theta_dot_process_noise": self.process_noise}
 
@@ -245,8 +223,7 @@ class Paper(Case):
         exact = replace(matched(condition, self.runs(plan), self.length(plan), plan.seed), knowledge=told)
         if (factors := self.factors(exact, plan)) is not None:
             exact = tightened(exact, factors)
-        defaults = {row.name: row.default for row in settings_table()}
-        return detrended(exact, defaults["trim_corner"], defaults["align_time"])
+        return detrended(exact, Config().settings)
 
     def factors(self, batch: Batch, plan: Plan) -> Array | None:
         """Return (K, 3) of the parameters of the runs; None where they are as drawn."""
@@ -341,10 +318,7 @@ ON_REQUEST = ("paper", "wrong tuning", "protocol")
 @cache
 def cases() -> Mapping[str, Case]:
     """Return all there are, by name."""
-    return {
-        case.name: case
-        for case in (*_matched(), *_steps(), *_wrong_noise(), *_wrong_tuning(), *_paper(), *_protocols(), *_recorded())
-    }
+    return {case.name: case for case in (*_matched(), *_steps(), *_wrong(), *_paper(), *_protocols(), *_recorded())}
 
 
 _WITH_TORQUE = ("lever", "linear_physical")
@@ -391,16 +365,17 @@ def _steps() -> Iterator[Case]:
                 )
 
 
-def _wrong_noise() -> Iterator[Case]:
-    for preload in ("fixed", "trim"):
-        title = f"told R and Q wrong by 10, matched walk, lever, preload {preload}, base and {DITHER:g} N m dither"
-        yield WrongNoise(name=f"wrong_noise_{preload}", title=title, preload=preload, dither_rms=DITHER)
-
-
-def _wrong_tuning() -> Iterator[Case]:
-    for preload in ("fixed", "trim"):
-        title = f"R, Q, prior, walk wrong by 10, matched walk, lever, preload {preload}, base and {DITHER:g} N m dither"
-        yield WrongTuning(name=f"wrong_tuning_{preload}", title=title, preload=preload, dither_rms=DITHER)
+def _wrong() -> Iterator[Case]:
+    """Yield matched cases for firmware that is told wrong noise, or a wrong first uncertainty or walk besides."""
+    for kind, wrong in (("wrong noise", "told R and Q"), ("wrong tuning", "R, Q, prior, walk")):
+        for preload in ("fixed", "trim"):
+            yield Matched(
+                name=f"{kind.replace(' ', '_')}_{preload}",
+                title=f"{wrong} wrong by 10, matched walk, lever, preload {preload}, base and {DITHER:g} N m dither",
+                kind=kind,
+                preload=preload,
+                dither_rms=DITHER,
+            )
 
 
 def _paper() -> Iterator[Case]:

@@ -11,8 +11,9 @@ from lever_cdkf.report.figure import Spec
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import number, rows_table, table
 
+from ..matched import PRIOR
 from . import charts
-from .cases import PRIOR, cases
+from .cases import cases
 from .evaluation import Row
 from .run_cases import Results
 from .verdicts import Claim

@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 from lever_cdkf.errors import LeverError
-from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.firmware.config import Config
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.runtime.extras import require
 from lever_cdkf.runtime.files import Outputs, write_text, writing
 from lever_cdkf.runtime.provenance import provenance, sha256
 
 from ..data import Batch, Knowledge, Truth
-from ..detrended import detrended
+from ..detrended import measured
 from ..matched import KINDS
 from .cases import Case, Plan, cases
 
@@ -89,20 +89,14 @@ def read(folder: Path, name: str) -> Batch:
         """Return (B, K, n)."""
         return np.stack([table[each].to_numpy().reshape(runs, -1) for each in names], axis=-1)
 
-    kind = KINDS[known["model"]]
-    settings = {row.name: row.default for row in settings_table()} | known["settings"]
     own: dict[str, Any] = {
         key: np.array(value) if isinstance(value, list) else value for key, value in known["knowledge"].items()
     }
-    parameters = [f"true_{each}" for each in kind.parameters]
+    parameters = [f"true_{each}" for each in KINDS[known["model"]].parameters]
     has_parameters = set(parameters) <= set(table.column_names)
-    y, u = columns(*_MEASURED[:2]), columns(*_MEASURED[2:])
     truth = Truth(columns(*_TRUE[:2]), columns(*parameters) if has_parameters else None, columns(*_TRUE[2:]))
-    model, trim = kind.make(settings, known["preload"]), np.zeros(y.shape[:2])
-    batch = Batch(model, known["period_s"], y, u, trim, Knowledge(**own), truth, y, u)
-    if known["preload"] == "fixed":
-        return batch
-    return detrended(batch, settings["trim_corner"], settings["align_time"])
+    settings, signals = Config().settings | known["settings"], (columns(*_MEASURED[:2]), columns(*_MEASURED[2:]))
+    return measured(settings, known["model"], known["preload"], signals, truth, Knowledge(**own))
 
 
 def _known(case: Case, batch: Batch) -> dict[str, Any]:

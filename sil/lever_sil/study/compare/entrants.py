@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
-from lever_cdkf.firmware.config import setting, settings_table
+from lever_cdkf.firmware.config import Config, setting
 
 from ..baselines import BASELINES
 from ..candidate import candidate
@@ -70,30 +70,26 @@ def entrants(case: Case) -> dict[str, Entrant]:
     return {entrant.name: entrant for entrant in (*chosen, *_CANDIDATES.values())}
 
 
+def _told(estimator: str, adaptation: str) -> Callable[[Case], Estimator]:
+    """Return the firmware that is told the noise, without detection of changes."""
+
+    def make(case: Case) -> Estimator:
+        align = {"align_time": 0.0} if case.preload == "fixed" else {}
+        still = {"change_threshold": 0.0, "noise_window": 0.0, **align}
+        return Firmware(case.model, case.preload, estimator, adaptation, {**case.own_settings, **case.noise, **still})
+
+    return make
+
+
 def _given_noise() -> list[Entrant]:
-    def maker(estimator: str) -> Callable[[Case], Estimator]:
-        def make(case: Case) -> Estimator:
-            align = {"align_time": 0.0} if case.preload == "fixed" else {}
-            still = {"change_threshold": 0.0, "noise_window": 0.0, **align}
-            return Firmware(case.model, case.preload, estimator, "fixed", {**case.own_settings, **case.noise, **still})
-
-        return make
-
-    return [Entrant(name, f"firmware, {name}, told the noise", True, maker(name)) for name in OURS]
+    return [Entrant(name, f"firmware, {name}, told the noise", True, _told(name, "fixed")) for name in OURS]
 
 
 def _adaptations() -> list[Entrant]:
-    """Told the noise, without detection of changes, with each of the paper's kinds of parameter noise."""
-
-    def maker(estimator: str, adaptation: str) -> Callable[[Case], Estimator]:
-        still = {"change_threshold": 0.0, "noise_window": 0.0}
-        return lambda case: Firmware(
-            case.model, case.preload, estimator, adaptation, {**case.own_settings, **case.noise, **still}
-        )
-
+    """With each of the paper's kinds of parameter noise."""
     kinds = {"fixed": "fixed walk", "annealing": "annealed walk", "robbins_monro": "walk by Robbins-Monro"}
     told = [
-        Entrant(f"{name}_{kind}", f"firmware, {name}, told the noise, {title}", True, maker(name, kind))
+        Entrant(f"{name}_{kind}", f"firmware, {name}, told the noise, {title}", True, _told(name, kind))
         for name in OURS
         for kind, title in kinds.items()
     ]
@@ -127,7 +123,7 @@ def _no_change() -> list[Entrant]:
 
 
 def _wrong() -> list[Entrant]:
-    defaults = {row.name: row.default for row in settings_table()}
+    defaults = Config().settings
 
     def scaled_noise(r: float, q: float) -> dict[str, float]:
         factors = {"theta_noise": r, "theta_dot_noise": r, "theta_dot_process_noise": q}

@@ -10,11 +10,10 @@ import numpy as np
 from lever_cdkf.cli.tables import Row
 from lever_cdkf.numeric.arrays import Array
 
-from ...measures import settling_times
 from ..data import PARAMETERS, Batch
 from .cases import SQUARE, Protocol, cases
 from .evaluation import FREQUENCY
-from .paper import pair
+from .paper import of_runs, pair
 from .run_cases import Outcome, Results
 
 SEEDS = 100
@@ -36,8 +35,7 @@ def remnants(results: Results) -> list[Row]:
         case = cases()[name]
         assert isinstance(case, Protocol)
         errors = 100.0 * outcome.relative[:, case.judged(outcome.time, results.plan), FREQUENCY]
-        change = case.change(results.plan)
-        times = np.empty(0) if change is None else settling_times(outcome.errors[..., FREQUENCY], outcome.time - change)
+        times = of_runs(outcome, case, results.plan).followed
         rows.append(
             {
                 "parameters": case.truth,

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from lever_cdkf.firmware.config import settings_table
+from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.library import lib
 from lever_cdkf.models.lever import Lever
 from lever_cdkf.numeric.arrays import Array
@@ -62,7 +62,7 @@ def tracks(logs: Sequence[Log], joint_filter: JointFilter) -> list[Track]:
 
 def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
     """Return the batch of all logs side by side."""
-    settings = {row.name: row.default for row in settings_table()}
+    settings = Config().settings
     signals = np.stack([np.concatenate([log.signals[name] for log in logs], axis=1) for name in _SIGNALS], axis=-1)
     trim = np.broadcast_to(np.concatenate([log.trim for log in logs]), signals.shape[:2])
     invalid = np.isnan(signals)
@@ -139,7 +139,7 @@ def _track(batch: Batch, estimates: Estimates) -> Track:
 def _feedthrough(batch: Batch, estimates: Estimates) -> Feedthrough:
     """theta/z_ddot about the trim at every RESPONSE_STRIDE-th time; its sigma to first order, by differences of w."""
     assert estimates.covariance is not None
-    lever = KINDS["lever"].make({row.name: row.default for row in settings_table()}, "trim")
+    lever = KINDS["lever"].make(Config().settings, "trim")
     assert isinstance(lever, Lever)
     w, trim = estimates.w[:, ::RESPONSE_STRIDE], batch.trim[:, estimates.at[::RESPONSE_STRIDE]]
     s = 2j * np.pi * FREQUENCIES

@@ -169,6 +169,15 @@ def interval(x: Array, centre: Array, sigma: Array, name: str, look: str, *, fil
     return Band(x, centre - 2.0 * sigma, centre + 2.0 * sigma, name, look, filled)
 
 
+def tracked(x: Array, truth: Array, estimate: Array, sigma: Array) -> tuple[Trace, ...]:
+    """Return a quantity that is estimated, its truth, and what the estimator says of it."""
+    return (
+        interval(x, estimate, sigma, "estimate ± 2σ", "estimate-band"),
+        Curve(x, estimate, "estimate", "estimate"),
+        Curve(x, truth, "truth", "truth"),
+    )
+
+
 def number(value: float, digits: int = 2) -> str:
     """`value` with so many digits that count, and no exponent."""
     return f"{Decimal(f'{value:.{digits}g}'):,f}"

@@ -14,7 +14,7 @@ from ...measures import covered, settling_times
 from ..data import Batch
 from ..matched import Condition, jump, matched, tightened
 from ..scores import median_and_worst
-from .description import Band, Column, Curve, Figure, Row, interval, number, percent
+from .description import Band, Column, Curve, Figure, Row, number, percent, tracked
 from .runs import DITHER, PRIOR, Extent, estimates, shown
 
 _FACTORS = np.array((1.0, 1.3, 1.3))  # of m_p, c_p, k_p
@@ -68,14 +68,7 @@ def _case(batch: Batch, condition: Condition, threshold: float, at: NDArray[np.i
 
 def _rows(time: Array, truth: Array, case: _Case) -> tuple[Row, ...]:
     one = tuple(
-        Row(
-            label,
-            (
-                interval(time, case.value[0, :, index], case.sigma[0, :, index], "estimate ± 2σ", "estimate-band"),
-                Curve(time, case.value[0, :, index], "estimate", "estimate"),
-                Curve(time, truth[0, :, index], "truth", "truth"),
-            ),
-        )
+        Row(label, tracked(time, truth[0, :, index], case.value[0, :, index], case.sigma[0, :, index]))
         for index, label in ((1, "c_p [N s/m]"), (_STIFFNESS, "k_p [N/m]"), (3, "f_n [Hz]"))
     )
     error = 100.0 * np.abs(case.value / truth - 1.0)[..., _STIFFNESS]

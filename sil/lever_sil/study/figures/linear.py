@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from ...measures import covered, rms
 from ..data import Batch
-from ..matched import KINDS, Condition, matched
-from .description import Band, Column, Curve, Figure, Points, Row, Trace, interval, number, percent
+from ..matched import KINDS, PRIOR, Condition, matched
+from .description import Column, Curve, Figure, Points, Row, Trace, interval, number, percent, tracked
 from .runs import WILD, Extent, estimates, late, matched_config, shown
 
-_PRIOR = {"m_sigma": 0.25, "c_sigma": 0.3, "k_sigma": 0.3, "lever_preload_angle": 0.0}
+_PRIOR = {**PRIOR["linear_physical"], "lever_preload_angle": 0.0}
 _FORCE = 2.0  # [N] rms: in the acceleration of the mass about what the base does
 _PROCESS_NOISE = 0.1  # [m/s/√s]: twice the default, so that it can be seen
 _NOISY = Condition(
@@ -150,21 +150,13 @@ def _parameters(condition: Condition, seed: int, extent: Extent) -> list[tuple[R
         symbol, unit = _SYMBOLS.get(name, name), setting(name).unit.replace("^2", "²")
         truth, estimate = batch.truth.p[0, at, index], estimated["parameter"][:, index]
         sigma, off = estimated["parameter_sigma"][:, index], rms((estimate - truth)[settled])
-        row = Row(f"{symbol} [{unit}]", _tracked(time, truth, estimate, sigma))
+        row = Row(f"{symbol} [{unit}]", tracked(time, truth, estimate, sigma))
         parts.append((row, f"{symbol} {_with_unit(off, unit)} ({percent(float(covered(estimate - truth, sigma)), 3)})"))
     return parts
 
 
 def _with_unit(value: float, unit: str) -> str:
     return number(value) if unit == "1" else f"{number(value)} {unit}"
-
-
-def _tracked(time: Array, truth: Array, estimate: Array, sigma: Array) -> tuple[Band, Curve, Curve]:
-    return (
-        interval(time, estimate, sigma, "estimate ± 2σ", "estimate-band"),
-        Curve(time, estimate, "estimate", "estimate"),
-        Curve(time, truth, "truth", "truth"),
-    )
 
 
 def _excerpt(batch: Batch) -> tuple[Array, NDArray[np.int64]]:

@@ -6,15 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.firmware.native import Config, run_samples
+from lever_cdkf.firmware.config import Config
 from lever_cdkf.numeric.arrays import Array
 from lever_cdkf.report.series import spread_indices
 from numpy.typing import NDArray
 
+from .. import matched
 from ..data import Batch
+from ..firmware import run_of
 from ..matched import Condition
 
-PRIOR: Mapping[str, float] = {"m_p_sigma": 0.25, "c_p_sigma": 0.3, "k_p_sigma": 0.3}
+PRIOR = matched.PRIOR["lever"]
 """Of the lever's parameters, for truth and filter alike."""
 MATCHED: Mapping[str, float] = {"change_threshold": 0.0, "noise_window": 0.0, "align_time": 0.0}
 """What the filter of a matched run must not do, since the truth gives no reason to: look for changes of the pilot,
@@ -50,10 +52,7 @@ def estimates(
     config: Config, batch: Batch, run: int = 0, at: NDArray[np.int64] | None = None
 ) -> dict[str, NDArray[np.float64]]:
     """Return columns of lever_estimate_t after the samples `at` (all without it) of one run, by the firmware."""
-    y, u = batch.raw_y[run], batch.raw_u[run]
-    time_us = np.arange(batch.samples, dtype=np.int64) * round(batch.period * 1e6)
-    samples = {"time_us": time_us, "theta": y[:, 0], "theta_dot": y[:, 1], "z_ddot": u[:, 0], "tau_m": u[:, 1]}
-    return {name: column.astype(np.float64) for name, column in run_samples(config, samples, at).items()}
+    return {name: column.astype(np.float64) for name, column in run_of(config, batch, run, at).items()}
 
 
 def late(time: Array) -> NDArray[np.bool_]:
