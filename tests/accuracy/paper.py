@@ -19,21 +19,23 @@ ROOT = Path(__file__).resolve().parents[2]
 if __name__ == "__main__":
     sys.path[0] = str(ROOT / "tests")
 
-from accuracy import tables  # noqa: E402
+from accuracy import protocols, tables  # noqa: E402
 from accuracy.tables import Place  # noqa: E402
 from lever_cdkf.cli.progress import Progress  # noqa: E402
-from lever_cdkf.cli.tables import Row  # noqa: E402
+from lever_cdkf.cli.tables import Cell, Row  # noqa: E402
 from lever_cdkf.errors import LeverError  # noqa: E402
 from lever_cdkf.runtime.files import write_text  # noqa: E402
 from lever_sil.run import seeds  # noqa: E402
 from lever_sil.study import no_accelerometer  # noqa: E402
-from lever_sil.study.compare import paper, protocols, run_cases  # noqa: E402
-from lever_sil.study.compare.cases import Plan  # noqa: E402
+from lever_sil.study.compare import paper, run_cases  # noqa: E402
+from lever_sil.study.compare.cases import Plan, cases  # noqa: E402
+from lever_sil.study.compare.entrants import tuning_name, wrongly_tuned  # noqa: E402
 
 SEEDS = paper.SEEDS
 FILE = "sil/lever_sil/study/PAPER.md"
 ACCEPT = "paper-accept"
 MODELS = ("linear_physical", "linear_black_box", "lever")
+TUNING = ("wrong_tuning_fixed", "wrong_tuning_trim")
 
 
 def _ran(names: Sequence[str], count: int = SEEDS) -> run_cases.Results:
@@ -47,8 +49,20 @@ def _experiment() -> Mapping[str, Sequence[Row]]:
     return paper.tables(_ran(paper.names()))
 
 
-def _tuning() -> Sequence[Row]:
-    return paper.tuning(_ran(paper.TUNING))
+def tuning(results: run_cases.Results) -> list[Row]:
+    """Return a row for each wrong tuning of the cases wrong_tuning_*, the right one first."""
+    rows: list[Row] = []
+    for wrong in wrongly_tuned():
+        row: dict[str, Cell] = {"wrong": ", ".join(f"{name} × {factor}" for name, factor in wrong.items()) or "nothing"}
+        for name in TUNING:
+            preload = cases()[name].preload
+            figures = paper.of_runs(results.outcomes[name, tuning_name(wrong)], cases()[name], results.plan)
+            row |= {
+                f"{preload}: rms [%]": paper.pair(100.0 * figures.rms),
+                f"{preload}: ±2σ covers [%]": paper.pair(-100.0 * figures.covered),
+            }
+        rows.append(row)
+    return rows
 
 
 RELAXED = tables.Table(
@@ -71,7 +85,7 @@ TABLES: Mapping[Place, Callable[[], Sequence[Row]]] = {
         Place(FILE, f"experiment, {model}", ACCEPT): partial(lambda model: _experiment()[f"{model}, 20 seeds"], model)
         for model in MODELS
     },
-    Place(FILE, "wrong tuning", ACCEPT): _tuning,
+    Place(FILE, "wrong tuning", ACCEPT): lambda: tuning(_ran(TUNING)),
     Place(FILE, "no accelerometer", ACCEPT): no_accelerometer.rows,
     Place(FILE, "remnant", ACCEPT): lambda: protocols.remnants(_ran(protocols.names(), protocols.SEEDS)),
     Place(FILE, "square wave", ACCEPT): lambda: protocols.square_wave(_ran([protocols.SQUARE_WAVE], protocols.SEEDS)),

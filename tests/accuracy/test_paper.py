@@ -10,12 +10,12 @@ import re
 from pathlib import Path
 
 import pytest
-from accuracy import paper, tables
+from accuracy import paper, protocols, tables
 from accuracy.paper import MODELS, SEEDS, TABLES
 from accuracy.tables import Place
 from lever_sil.study import no_accelerometer
 from lever_sil.study.compare import paper as experiment
-from lever_sil.study.compare import protocols, run_cases
+from lever_sil.study.compare import run_cases
 from lever_sil.study.compare.cases import Plan, Protocol, cases
 from lever_sil.study.compare.entrants import entrants, tuning_name, wrongly_tuned
 

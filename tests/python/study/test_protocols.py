@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_sil.study.compare import protocols
+from accuracy import protocols
+from accuracy.protocols import SQUARE_WAVE, accounted, remnants, square_wave
 from lever_sil.study.compare.cases import SQUARE, Plan, Protocol, cases
 from lever_sil.study.compare.entrants import entrants
-from lever_sil.study.compare.protocols import SQUARE_WAVE, accounted, remnants, square_wave
 from lever_sil.study.compare.run_cases import Outcome, Results
 
 PLAN = Plan(seeds=3, duration=4.0)

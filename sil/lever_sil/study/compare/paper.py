@@ -1,4 +1,4 @@
-"""The tables of ../PAPER.md: the experiment of the paper, by model (`lever compare --paper`), and wrong tuning."""
+"""The tables of the experiment of the paper, by model: `lever compare --paper`."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from lever_cdkf.cli.tables import Cell, Row
+from lever_cdkf.cli.tables import Row
 from lever_cdkf.numeric.arrays import Array
 
 from ... import measures
 from ..data import PARAMETERS
 from .cases import Case, Paper, Plan, cases
-from .entrants import tuning_name, wrongly_tuned
 from .evaluation import FREQUENCY
 from .run_cases import Outcome, Results
 
 SEEDS = 20
-TUNING = ("wrong_tuning_fixed", "wrong_tuning_trim")
 
 
 @dataclass(frozen=True)
@@ -58,22 +56,6 @@ def tables(results: Results) -> dict[str, list[Row]]:
             }
         )
     return by_title
-
-
-def tuning(results: Results) -> list[Row]:
-    """Return a row for each wrong tuning of the cases wrong_tuning_*, the right one first; cells as in `tables`."""
-    rows: list[Row] = []
-    for wrong in wrongly_tuned():
-        row: dict[str, Cell] = {"wrong": ", ".join(f"{name} × {factor}" for name, factor in wrong.items()) or "nothing"}
-        for name in TUNING:
-            preload = cases()[name].preload
-            figures = of_runs(results.outcomes[name, tuning_name(wrong)], cases()[name], results.plan)
-            row |= {
-                f"{preload}: rms [%]": pair(100.0 * figures.rms),
-                f"{preload}: ±2σ covers [%]": pair(-100.0 * figures.covered),
-            }
-        rows.append(row)
-    return rows
 
 
 def of_runs(outcome: Outcome, case: Case, plan: Plan) -> Figures:

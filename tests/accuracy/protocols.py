@@ -1,4 +1,4 @@
-"""The protocols of others as tables for ../PAPER.md: rising remnant (Olivari), square wave of stiffness (van de Ruit).
+"""The protocols of others as tables for PAPER.md: rising remnant (Olivari), square wave of stiffness (van de Ruit).
 
 M. Olivari and others 2014 and 2016; M. van de Ruit and others 2018. Arms, noises and signals are ours, so that only the
 questions are the same.
@@ -9,12 +9,11 @@ from __future__ import annotations
 import numpy as np
 from lever_cdkf.cli.tables import Row
 from lever_cdkf.numeric.arrays import Array
-
-from ..data import PARAMETERS, Batch
-from .cases import SQUARE, Protocol, cases
-from .evaluation import FREQUENCY
-from .paper import of_runs, pair
-from .run_cases import Outcome, Results
+from lever_sil.study.compare.cases import SQUARE, Protocol, cases
+from lever_sil.study.compare.evaluation import FREQUENCY
+from lever_sil.study.compare.paper import of_runs, pair
+from lever_sil.study.compare.run_cases import Outcome, Results
+from lever_sil.study.data import PARAMETERS, Batch
 
 SEEDS = 100
 SQUARE_WAVE = "square_wave"
