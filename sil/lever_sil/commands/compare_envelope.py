@@ -28,15 +28,12 @@ def run(args: argparse.Namespace) -> int:
             raise LeverError(f"--{name} does not go with --envelope")
     check_names("condition", args.scenarios or (), conditions.CONDITIONS, "lever compare --envelope --list")
     check_names("estimator", args.estimators or (), run_estimators.ESTIMATORS, "lever compare --envelope --list")
-    wanted = args.scenarios or [name for name, one in conditions.CONDITIONS.items() if one.quick or not args.quick]
+    usual = [name for name, one in conditions.CONDITIONS.items() if one.quick or not args.quick]
+    wanted = [name for name in conditions.CONDITIONS if name in (args.scenarios or usual)]
     seeds = args.seeds if args.seeds is not None else SEEDS
-    todo = run_estimators.tasks(
-        [one for name, one in conditions.CONDITIONS.items() if name in wanted],
-        seeds,
-        args.estimators or run_estimators.ESTIMATORS,
-    )
+    estimators = [name for name in run_estimators.ESTIMATORS if name in (args.estimators or run_estimators.ESTIMATORS)]
     with Progress("compare") as progress:
-        results = run_estimators.run(todo, args.jobs, progress.show)
+        results = run_estimators.run(wanted, seeds, estimators, args.jobs, progress.show)
     print_tables(tables.tables(results, seeds))
     for sentence in tables.verdicts(results):
         say(sentence)

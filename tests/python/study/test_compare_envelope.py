@@ -46,21 +46,12 @@ def test_high_pass_is_two_butterworths_of_second_order(frequency: float) -> None
 # --- logs ------------------------------------------------------------------------------------------------------------
 
 
-def test_conditions_are_filtered_together_where_a_batch_allows_it() -> None:
-    rough = dataclasses.replace(SHORT, process_noise=0.5)
-    lost = ClosedLoop()
-    chosen = [Condition(f"calm {i}", "", SHORT, runs=3) for i in range(9)]
-    chosen += [Condition("rough", "", rough), Condition("lost", "", SHORT, closed_loop=lost)]
-    sizes = [[one.name for one in chunk] for chunk in logs.chunks(chosen, 4)]
-    assert sizes == [[f"calm {i}" for i in range(5)], [f"calm {i}" for i in range(5, 9)], ["rough"], ["lost"]]
-
-
 def test_logs_say_what_the_sensors_said() -> None:
     short = Motion(duration=0.5)
     invalid = Sensors(faults=(("z_ddot", Reads(value=INVALID, start=0.2, end=0.3)),))
-    chunk = [Condition("a", "", short), Condition("b", "", short, sensors=invalid), Condition("c", "", short, runs=2)]
-    first, second, third = logs.logs(chunk, 2)
-    assert first.recording is second.recording
+    chunk = (Condition("a", "", short), Condition("b", "", short, sensors=invalid), Condition("c", "", short, runs=2))
+    first, second, third = (logs.log_of(condition, 2) for condition in chunk)
+    np.testing.assert_array_equal(second.recording.theta, first.recording.theta)
     assert third.recording.theta.shape == (501, 4)
     np.testing.assert_array_equal(third.recording.theta[:, :2], first.recording.theta)
     np.testing.assert_allclose(first.trim, first.recording.theta[0])
@@ -68,7 +59,7 @@ def test_logs_say_what_the_sensors_said() -> None:
     assert np.isnan(second.signals["z_ddot"][210:290]).all()
     assert first.firmware is not None
     whole = Condition("whole", "", short, closed_loop=ClosedLoop(whole=True))
-    (log,) = logs.logs([whole], 2)
+    log = logs.log_of(whole, 2)
     gone = np.isnan(log.signals["theta"])
     assert 0.4 < gone.mean() < 0.6
     np.testing.assert_array_equal(np.isnan(log.signals["z_ddot"]), gone)
@@ -79,13 +70,13 @@ def test_logs_say_what_the_sensors_said() -> None:
 
 def measured(log: logs.Log, name: str) -> tuple[float, float]:
     """Return median rms error of the natural frequency [%], and coverage [%]."""
-    (track,) = filters.tracks([log], filters.JOINT_FILTERS[name])
+    track = filters.track(log, filters.JOINT_FILTERS[name])
     outcome = Outcome(log.recording, track, log.condition.window)
     return tuple(float(np.median(FIGURES[f"f_n {what}"].compute(outcome))) for what in ("rms", "covered"))  # type: ignore[return-value]
 
 
 def test_movement_needs_the_high_pass() -> None:
-    (log,) = logs.logs([MOVED], 2)
+    log = logs.log_of(MOVED, 2)
     for name in filters.JOINT_FILTERS:
         rms, covered = measured(log, name)
         assert (rms < 5.0) == (covered > 60.0) == name.endswith("_hp"), (name, rms, covered)
@@ -96,7 +87,7 @@ def test_steady_flight_does_not_and_missing_samples_are_skipped() -> None:
         ("theta", Reads(value=INVALID, start=1.0, end=1.5)),
         ("z_ddot", Reads(value=INVALID, start=2.0, end=2.2)),
     )
-    (log,) = logs.logs([Condition("steady", "", SHORT, sensors=Sensors(faults=faults), start=4.0)], 8)
+    log = logs.log_of(Condition("steady", "", SHORT, sensors=Sensors(faults=faults), start=4.0), 8)
     for name in filters.JOINT_FILTERS:
         rms, covered = measured(log, name)
         assert rms < 4.0, name
@@ -105,10 +96,10 @@ def test_steady_flight_does_not_and_missing_samples_are_skipped() -> None:
 
 def test_feedthrough_is_as_uncertain_as_a_cloud_of_parameters() -> None:
     """The lever's transfer function written out, at a trim of 20 degrees."""
-    (log,) = logs.logs([Condition("still", "", Motion(duration=0.2))], 1)
+    log = logs.log_of(Condition("still", "", Motion(duration=0.2)), 1)
     log = dataclasses.replace(log, trim=np.radians([20.0]))
     peer = filters.JointFilter("", fixed, False)
-    found = filters.tracks([log], peer)[0].feedthrough
+    found = filters.track(log, peer).feedthrough
     assert found is not None
     m_p, c_p, k_p = np.array([2.5, 42.0, 1500.0])[:, None, None] * np.exp(
         0.01 * np.random.default_rng(1).standard_normal((3, 50_000, 1))
@@ -129,11 +120,10 @@ def fixed(batch: Batch, at: NDArray[np.int64]) -> Estimates:
 
 
 def test_progress_counts_conditions(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_estimators, "do", lambda task: (task, []))
+    monkeypatch.setattr(run_estimators, "do", lambda _task: [])
     shown: list[tuple[int, int, str]] = []
-    todo = [run_estimators.Task(("a", "b"), 1, ()), run_estimators.Task(("c",), 1, ())]
-    assert run_estimators.run(todo, 1, lambda *step: shown.append(step)) == []
-    assert shown == [(2, 3, "b"), (3, 3, "c")]
+    assert run_estimators.run(["a", "b"], 1, (), 1, lambda *step: shown.append(step)) == []
+    assert shown == [(1, 2, "a"), (2, 2, "b")]
 
 
 # --- how it is said --------------------------------------------------------------------------------------------------

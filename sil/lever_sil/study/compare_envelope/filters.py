@@ -1,4 +1,4 @@
-"""The joint filters on many logs at once: joint EKF and UKF told the true noise and trim, with and without a high-pass.
+"""The joint filters on a log: joint EKF and UKF told the true noise and trim, with and without a high-pass.
 
 All get what the firmware gets by default (first guess, its uncertainty, random walk, the lever) and are told besides
 the process noise of the condition and the trim: the angle about which the pilot moves the lever. What the pilot does
@@ -8,7 +8,6 @@ two Butterworth filters of second order at `trim_corner` on all four signals, th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,23 +47,16 @@ JOINT_FILTERS = {
 }
 
 
-def tracks(logs: Sequence[Log], joint_filter: JointFilter) -> list[Track]:
-    """Return what a joint filter says of each log, all of one chunk, at every STRIDE-th sample.
-
-    NaN from where it breaks down.
-    """
-    batch = _batch(logs, joint_filter.high_pass)
-    at = np.arange(0, batch.samples, STRIDE, dtype=np.int64)
-    whole = _track(batch, joint_filter.run(batch, at))
-    ends = np.cumsum([len(log.trim) for log in logs]).tolist()
-    return [_part(whole, slice(end - len(log.trim), end)) for log, end in zip(logs, ends, strict=True)]
+def track(log: Log, joint_filter: JointFilter) -> Track:
+    """Return what a joint filter says of a log at every STRIDE-th sample; NaN from where it breaks down."""
+    batch = _batch(log, joint_filter.high_pass)
+    return _track(batch, joint_filter.run(batch, np.arange(0, batch.samples, STRIDE, dtype=np.int64)))
 
 
-def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
-    """Return the batch of all logs side by side."""
+def _batch(log: Log, high_passed: bool) -> Batch:
     settings = Config().settings
-    signals = np.stack([np.concatenate([log.signals[name] for log in logs], axis=1) for name in _SIGNALS], axis=-1)
-    trim = np.broadcast_to(np.concatenate([log.trim for log in logs]), signals.shape[:2])
+    signals = np.stack([log.signals[name] for name in _SIGNALS], axis=-1)
+    trim = np.broadcast_to(log.trim, signals.shape[:2])
     invalid = np.isnan(signals)
     missing = invalid[..., :2] | invalid[..., 2:].any(axis=-1, keepdims=True)  # without inputs no output is of use
     if not high_passed:
@@ -78,7 +70,7 @@ def _batch(logs: Sequence[Log], high_passed: bool) -> Batch:
     with_noise = settings | {
         "theta_noise": SENSORS["theta"].noise,
         "theta_dot_noise": SENSORS["theta_dot"].noise,
-        "theta_dot_process_noise": logs[0].condition.motion.process_noise,
+        "theta_dot_process_noise": log.condition.motion.process_noise,
     }
     y, u, trim, missing = (part.swapaxes(0, 1) for part in (signals[..., :2], signals[..., 2:], trim, missing))
     kind = KINDS["lever"]
@@ -158,16 +150,3 @@ def _feedthrough(batch: Batch, estimates: Estimates) -> Feedthrough:
         np.sqrt(np.einsum("btfi,btij,btfj->tbf", part, covariance, part)) for part in (gradient.real, gradient.imag)
     )
     return Feedthrough(response(w).swapaxes(0, 1), gain, phase)
-
-
-def _part(track: Track, runs: slice) -> Track:
-    whole = track.feedthrough
-    assert whole is not None
-    return Track(
-        time=track.time,
-        value={name: column[:, runs] for name, column in track.value.items()},
-        sigma={name: column[:, runs] for name, column in track.sigma.items()},
-        faults=track.faults[:, runs],
-        mode=track.mode[:, runs],
-        feedthrough=Feedthrough(whole.response[:, runs], whole.gain_sigma[:, runs], whole.phase_sigma[:, runs]),
-    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from lever_cdkf.errors import SettingsError
@@ -11,13 +11,10 @@ from lever_cdkf.numeric.arrays import Array
 
 from ...batch import firmware, pilots
 from ...batch.firmware import ClosedLoop
-from ...batch.motions import Motion, Recording, arms, simulated
+from ...batch.motions import Recording, arms, simulated
 from ...batch.sensors import Sensors, lost, measured
 from ...envelope.condition import Condition
 from ...plants.sensors import INVALID
-
-LANES = 64
-"""Runs filtered at a time: more would save little time and cost memory."""
 
 
 @dataclass(frozen=True)
@@ -34,40 +31,15 @@ class Log:
     """None where the firmware does not know a setting of the condition."""
 
 
-def chunks(conditions: Iterable[Condition], seeds: int) -> list[list[Condition]]:
-    """Return conditions that are filtered together: as long, with the same process noise, at most LANES runs."""
-    by_kind: dict[tuple[object, ...], list[list[Condition]]] = {}
-    for condition in conditions:
-        motion = condition.motion
-        kind = (motion.duration, motion.process_noise, motion.pilot == "arm", condition.closed_loop)
-        groups = by_kind.setdefault(kind, [[]])
-        if groups[-1] and seeds * sum(one.runs for one in (*groups[-1], condition)) > LANES:
-            groups.append([])
-        groups[-1].append(condition)
-    return [group for groups in by_kind.values() for group in groups]
-
-
-def logs(chunk: Sequence[Condition], seeds: int) -> Iterator[Log]:
-    """Yield the logs of a chunk; equal motions are simulated once."""
-    recordings = _recordings({(each.motion, range(seeds * each.runs)) for each in chunk if each.closed_loop is None})
-    for condition in chunk:
-        own = range(seeds * condition.runs)
-        trim = arms(own)[3][0]
-        if condition.closed_loop is not None:
-            yield _closed_loop(condition, condition.closed_loop, own, trim)
-        else:
-            recording = recordings[condition.motion, own]
-            signals = measured(recording, condition.sensors, own)
-            yield Log(
-                condition, recording, signals, trim, _firmware(condition, signals, recording.response is not None)
-            )
-
-
-def _recordings(keys: Iterable[tuple[Motion, range]]) -> dict[tuple[Motion, range], Recording]:
-    """Return all recordings of a chunk: arms are simulated side by side, other pilots one by one."""
-    held = [key for key in keys if key[0].pilot == "arm"]
-    others = {key: pilots.record(*key) for key in keys if key[0].pilot != "arm"}
-    return others | dict(zip(held, simulated(held), strict=True))
+def log_of(condition: Condition, seeds: int) -> Log:
+    """Return the log of a condition with so many pilots, or some times as many where runs draw."""
+    own, motion = range(seeds * condition.runs), condition.motion
+    trim = arms(own)[3][0]
+    if condition.closed_loop is not None:
+        return _closed_loop(condition, condition.closed_loop, own, trim)
+    recording = simulated([(motion, own)])[0] if motion.pilot == "arm" else pilots.record(motion, own)
+    signals = measured(recording, condition.sensors, own)
+    return Log(condition, recording, signals, trim, _firmware(condition, signals, recording.response is not None))
 
 
 def _firmware(condition: Condition, signals: Mapping[str, Array], response: bool) -> firmware.Track | None:

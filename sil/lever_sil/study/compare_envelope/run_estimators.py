@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.numeric.arrays import Array
-from lever_cdkf.runtime import interrupts
 
 from ...batch.firmware import Track
 from ...envelope import conditions
 from ...envelope.condition import Condition
 from ...envelope.measure import FIGURES, Outcome
-from .filters import JOINT_FILTERS, tracks
-from .logs import Log, chunks, logs
+from ...run.seeds import Progress, in_processes
+from .filters import JOINT_FILTERS, track
+from .logs import Log, log_of
 
 FIRMWARE = "firmware"
 ESTIMATORS = (FIRMWARE, *JOINT_FILTERS)
-
-Progress = Callable[[int, int, str], None]
-"""Called after each chunk: conditions done, of how many, and the last of them."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +34,14 @@ class EstimatorResult:
 
 @dataclass(frozen=True)
 class Task:
-    """Conditions that are run together."""
+    """A condition, and who is run on its log."""
 
-    conditions: tuple[str, ...]
+    condition: str
     seeds: int
     estimators: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return self.condition
 
 
 def figures(condition: Condition) -> tuple[str, str]:
@@ -50,32 +50,22 @@ def figures(condition: Condition) -> tuple[str, str]:
     return f"{of} rms", f"{of} covered"
 
 
-def tasks(chosen: Iterable[Condition], seeds: int, estimators: Sequence[str]) -> list[Task]:
-    """Return all there is to do."""
-    return [Task(tuple(one.name for one in chunk), seeds, tuple(estimators)) for chunk in chunks(chosen, seeds)]
+def run(
+    chosen: Iterable[str], seeds: int, estimators: Sequence[str], jobs: int, progress: Progress | None = None
+) -> list[EstimatorResult]:
+    """Run estimators on the conditions, in `jobs` processes. Interrupted, it leaves no process behind."""
+    todo = [Task(name, seeds, tuple(estimators)) for name in chosen]
+    return [result for results in in_processes(do, todo, jobs, progress) for result in results]
 
 
-def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> list[EstimatorResult]:
-    """Do all tasks, in `jobs` processes. Interrupted, it leaves no process behind."""
-    total, done = sum(len(task.conditions) for task in todo), 0
-    collected: list[EstimatorResult] = []
-    for task, results in interrupts.in_processes(do, todo, jobs):
-        collected += results
-        done += len(task.conditions)
-        if progress is not None:
-            progress(done, total, task.conditions[-1])
-    order = list(conditions.CONDITIONS)
-    return sorted(collected, key=lambda result: (order.index(result.condition), ESTIMATORS.index(result.estimator)))
-
-
-def do(task: Task) -> tuple[Task, list[EstimatorResult]]:
+def do(task: Task) -> list[EstimatorResult]:
     """Do one task."""
-    ready = list(logs([conditions.CONDITIONS[name] for name in task.conditions], task.seeds))
+    log = log_of(conditions.CONDITIONS[task.condition], task.seeds)
     results = []
     for name in task.estimators:
-        estimated = [log.firmware for log in ready] if name == FIRMWARE else tracks(ready, JOINT_FILTERS[name])
-        results += [_result(log, name, track) for log, track in zip(ready, estimated, strict=True) if track is not None]
-    return task, results
+        estimated = log.firmware if name == FIRMWARE else track(log, JOINT_FILTERS[name])
+        results += [] if estimated is None else [_result(log, name, estimated)]
+    return results
 
 
 def _result(log: Log, estimator: str, track: Track) -> EstimatorResult:
