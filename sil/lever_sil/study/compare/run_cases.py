@@ -7,26 +7,23 @@ the batch of a case once and keeps it until the next.
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 from lever_cdkf.numeric.arrays import Array
-from lever_cdkf.runtime import interrupts
 from numpy.typing import NDArray
 
 from ...measures import normalised_squares
+from ...run.seeds import Progress, in_processes
 from ..data import PARAMETERS, Batch, Estimates
 from ..scores import errors
 from ..transitions import dynamics_gradient, with_dynamics
 from . import dataset
 from .cases import Case, Matched, Plan, References, cases
 from .entrants import enter, entrants, is_candidate
-
-Progress = Callable[[int, int, str], None]
-"""Called after each task: how many are done, of how many, and what the last one was."""
 
 
 @dataclass(frozen=True)
@@ -90,17 +87,15 @@ def tasks(chosen: Iterable[str], names: Iterable[str] | None, plan: Plan) -> lis
 def run(todo: list[Task], jobs: int, progress: Progress | None = None) -> Results:
     """Do all tasks, in `jobs` processes. Interrupted, it leaves no process behind."""
     results = Results(todo[0].plan, {}, {})
-    for done, (task, result) in enumerate(interrupts.in_processes(do, todo, jobs), 1):
+    for task, result in zip(todo, in_processes(do, todo, jobs, progress), strict=True):
         if isinstance(result, Outcome):
             results.outcomes[task.case, task.entrant or ""] = result
         elif result is not None:
             results.references[task.case] = result
-        if progress is not None:
-            progress(done, len(todo), str(task))
     return results
 
 
-def do(task: Task) -> tuple[Task, Outcome | References | None]:
+def do(task: Task) -> Outcome | References | None:
     """Do one task."""
     if task.entrant is not None and is_candidate(task.entrant):
         enter(task.entrant)  # in this process
@@ -108,12 +103,11 @@ def do(task: Task) -> tuple[Task, Outcome | References | None]:
     batch = _batch(task.case, task.plan)
     at = samples(case, batch)
     if task.entrant is None:
-        return task, case.references(batch, at, task.plan)
-    entrant = entrants(case)[task.entrant]
-    estimator = entrant.make(case)
+        return case.references(batch, at, task.plan)
+    estimator = entrants(case)[task.entrant].make(case)
     start = clock.process_time()
     estimates = estimator(batch, at)
-    return task, outcome(batch, estimates, clock.process_time() - start)
+    return outcome(batch, estimates, clock.process_time() - start)
 
 
 @lru_cache(maxsize=1)
