@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..numeric.arrays import Array
+from ..numeric.stretches import runs
 from .series import packed
 
 Spec = dict[str, Any]
@@ -39,13 +40,16 @@ def dots(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) 
     return _trace(x, y, name, row) | {"mode": "markers", "marker": marker} | more
 
 
-def band(x: Array, low: Array, high: Array, name: str, colour: str, row: int = 0, **more: Any) -> list[Spec]:
-    """Return the area between two curves."""
-    finite = np.isfinite(low) & np.isfinite(high)
+def band(x: Array, low: Array, high: Array, name: str, colour: str, row: int = 0) -> list[Spec]:
+    """Return the area between two curves: a pair of traces for each stretch without NaN in either."""
     edge = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
-    lower = _trace(x[finite], low[finite], name, row) | edge | {"showlegend": False}
-    upper = _trace(x[finite], high[finite], name, row) | edge | {"fill": "tonexty", "fillcolor": f"@{colour}"}
-    return [lower, upper | more]
+    filled = {"fill": "tonexty", "fillcolor": f"@{colour}"}  # plotly.js fills wrongly where the traces have gaps
+    traces = []
+    for first, last in runs(np.isfinite(low) & np.isfinite(high)):
+        piece = slice(first, last + 1)
+        traces.append(_trace(x[piece], low[piece], name, row) | edge | {"showlegend": False})
+        traces.append(_trace(x[piece], high[piece], name, row) | edge | filled)
+    return traces
 
 
 def _trace(x: Array, y: Array, name: str, row: int) -> Spec:

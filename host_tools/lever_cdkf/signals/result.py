@@ -26,6 +26,7 @@ Text = NDArray[np.str_]
 
 _STATES = ("theta", "theta_dot")
 _MOST_POINTS = 5000  # of a curve
+_ROW = 1.2  # height of a chart in a plot [inches]
 
 
 @dataclass(frozen=True)
@@ -188,6 +189,7 @@ class Result(Mapping[str, Estimated]):
         """
         require("study")
         from ..exports import pictures
+        from ..report import printed
         from . import result_plot
 
         kind = None if path is None else Path(path).suffix.lower().removeprefix(".")
@@ -201,8 +203,8 @@ class Result(Mapping[str, Estimated]):
             for name, each in self._estimated.items()
             if name not in _STATES
         }
-        with pictures.style():
-            figure = result_plot.figure(self.time[at], list(shown.values()), pictures.WIDTHS[width])
+        described = result_plot.figure(self.time[at], list(shown.values())).spec()
+        figure = printed.charts([("", described)], _ROW * len(shown), width)
         if path is not None and kind is not None:
             content = pictures.render(figure, kind, self._heading(), provenance(), estimator=self._estimator())
             with whole(path) as target:

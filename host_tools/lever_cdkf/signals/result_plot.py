@@ -3,37 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..numeric.arrays import FloatArray
+from ..report.figure import Figure, Spec, axis, band, line, time_axis
 
 if TYPE_CHECKING:
     from .result import Estimated
 
-_ROW = 1.2  # [inches]
 _USUAL = (1.0, 99.0)  # percentiles of the values that an axis shows
 
 
-def figure(time: FloatArray, shown: Sequence[Estimated], width: float) -> Any:
-    """Return a chart for each quantity with its band of ±2 sigma, `width` [inches] wide, as a Figure of matplotlib."""
-    from matplotlib.figure import Figure
+def figure(time: FloatArray, shown: Sequence[Estimated]) -> Figure:
+    """Return a chart for each quantity with its band of ±2 sigma."""
+    drawn = Figure([_axis(each) for each in shown], time_axis(float(time[-1])))
+    drawn.more["showlegend"] = False
+    for row, each in enumerate(shown):
+        around = (each.values - 2.0 * each.sigma, each.values + 2.0 * each.sigma)
+        drawn.add(*band(time, *around, "±2 sigma", "estimate-band", row))
+        drawn.add(line(time, each.values, each.name, "estimate", row))
+    return drawn
 
-    sheet = Figure(figsize=(width, _ROW * len(shown)), layout="constrained")
-    axes = sheet.subplots(len(shown), 1, sharex=True)
-    for axis, each in zip(axes, shown, strict=True):
-        axis.fill_between(time, each.values - 2.0 * each.sigma, each.values + 2.0 * each.sigma, alpha=0.25, linewidth=0)
-        axis.plot(time, each.values, linewidth=1.0)
-        axis.set_ylabel(each.name if each.unit == "1" else f"{each.name}\n[{each.unit}]")
-        finite = each.values[np.isfinite(each.values)]
-        if len(finite):
-            low, high = np.percentile(finite, _USUAL)
-            room = max(0.5 * float(high - low), 4.0 * each.last_sigma, 1e-9)
-            axis.set_ylim(float(low) - room, float(high) + room)
-    axes[-1].set_xlabel("time [s]")
-    sheet.align_ylabels(axes)
-    return sheet
+
+def _axis(each: Estimated) -> Spec:
+    title = each.name if each.unit == "1" else f"{each.name}\n[{each.unit}]"
+    finite = each.values[np.isfinite(each.values)]
+    if not len(finite):
+        return axis(title)
+    low, high = np.percentile(finite, _USUAL)
+    room = max(0.5 * float(high - low), 4.0 * each.last_sigma, 1e-9)
+    return axis(title, range=[float(low) - room, float(high) + room])
 
 
 def table(time: FloatArray, shown: Sequence[Estimated]) -> str:

@@ -186,7 +186,10 @@ def test_everything_has_its_name(result: Result, tmp_path: Path) -> None:
 def test_the_plot_shows_the_last_estimates(result: Result) -> None:
     figure = result.plot()
     labels = [axis.get_ylabel() for axis in figure.axes]
-    assert labels == ["m_p\n[kg]", "c_p\n[N s/m]", "k_p\n[N/m]", "natural_frequency\n[Hz]", "damping_ratio"]
+    assert labels == [
+        *("$m_{p}$\n[kg]", "$c_{p}$\n[N s/m]", "$k_{p}$\n[N/m]"),
+        *("natural_frequency\n[Hz]", "damping_ratio"),
+    ]
     low, high = figure.axes[3].get_ylim()
     assert low < NATURAL_FREQUENCY < high
 

@@ -7,6 +7,8 @@ import pytest
 from lever_cdkf.numeric.stretches import runs
 from lever_cdkf.report import series
 from lever_cdkf.report.bode import FREQUENCIES, slow_trim, transfer
+from lever_cdkf.report.figure import Figure, axis, band, time_axis
+from lever_cdkf.report.printed import charts, values
 from oracle import Lever
 from scipy import signal
 
@@ -100,3 +102,16 @@ def test_jumps_are_found_once_and_drift_is_none() -> None:
 def test_runs_are_first_and_last_index() -> None:
     assert runs(np.array([True, True, False, True])) == [(0, 1), (3, 3)]
     assert runs(np.zeros(3, dtype=bool)) == []
+
+
+def test_a_band_ends_where_an_edge_is_unknown() -> None:
+    """On a page each stretch is a pair of traces, of which the legend shows one; in print each is an area."""
+    time, low = np.arange(8.0), np.ones(8)
+    low[3] = np.nan
+    figure = Figure([axis("y")], time_axis(7.0))
+    figure.add(*band(time, low, np.full(8, 2.0), "±2σ", "estimate-band"))
+    assert [values(trace["x"]).tolist() for trace in figure.traces[::2]] == [[0, 1, 2], [4, 5, 6, 7]]
+    assert [trace.get("showlegend", True) for trace in figure.traces] == [False, True, False, False]
+    (axes,) = charts([("", figure.spec())], 3.0, "double").axes
+    areas = [area.get_paths()[0].get_extents() for area in axes.collections]
+    assert [(area.x0, area.x1) for area in areas] == [(0.0, 2.0), (4.0, 7.0)]

@@ -57,7 +57,7 @@ def _traces(trace: Trace, row: int) -> list[chart.Spec]:
         marker = {"color": f"@{look.colour}", "size": _DOT}
         return [chart.dots(trace.x, trace.y, name, look.colour, row, marker=marker)]
     if isinstance(trace, Band) and trace.filled:
-        return chart.band(trace.x, trace.low, trace.high, name, look.colour, row, hoverinfo="skip")
+        return chart.band(trace.x, trace.low, trace.high, name, look.colour, row)
     if isinstance(trace, Band):
         edges = (trace.high, trace.low)
         return [chart.line(trace.x, edge, name, look.colour, row, **style, hoverinfo="skip") for edge in edges]
