@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import socket
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from ..errors import LeverError
@@ -19,6 +21,9 @@ _DEFAULTS: Mapping[str, Mapping[str, Any]] = {"slcan": {"bitrate": 1_000_000, "s
 _IN_PROCESS = ("lever", "virtual")
 _PACKAGES = {"udp_multicast": "msgpack", "gs_usb": "gs_usb"}
 """That an interface imports and python-can does not bring along."""
+_ROOM = 1 << 26
+"""[byte] for frames that wait: about 20 s of a full bus of 1 Mbit/s."""
+_SO_RCVBUFFORCE = 33  # <asm-generic/socket.h>; the module socket does not have it
 
 
 def add_bus_options(parser: argparse.ArgumentParser) -> None:
@@ -84,3 +89,13 @@ def open_bus(interface: str, channel: str | None, options: Mapping[str, Any], *,
     if bus.channel_info == can.BusABC.channel_info:  # slcan does not say what it is
         bus.channel_info = where
     return translate_bus(bus) if translated and interface != "lever" else bus
+
+
+def make_room(bus: can.BusABC) -> None:
+    """Let frames wait while this process has no turn: a socket holds but a tenth of a second otherwise."""
+    opened = getattr(bus, "socket", None)
+    if isinstance(opened, socket.socket):
+        for option in (_SO_RCVBUFFORCE, socket.SO_RCVBUF):  # the first takes a privilege
+            with suppress(OSError):
+                opened.setsockopt(socket.SOL_SOCKET, option, _ROOM)
+                return

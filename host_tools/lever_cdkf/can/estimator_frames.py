@@ -214,14 +214,14 @@ def sample_chunks(traffic: EstimatorFrames) -> Iterator[dict[str, NDArray[np.flo
 
     Corrupt frames are left out, and samples with the time of the one before. Raise LogError.
     """
-    pairing = _Pairing()
+    pairing = Pairing()
     for frames in traffic.chunks():
         samples = pairing.add(frames)
         if len(samples["time_us"]):
             yield samples
 
 
-class _Pairing:
+class Pairing:
     """BASE_SAMPLE with the LEVER_SAMPLE and GRIP_SAMPLE of its counter, across chunks."""
 
     def __init__(self) -> None:
@@ -229,6 +229,7 @@ class _Pairing:
         self._time_us: int | None = None
 
     def add(self, frames: Frames) -> dict[str, NDArray[np.float64]]:
+        """Return the samples that further frames complete, as sample_chunks() yields them."""
         identifiers = {name: codec.message(name).frame_id for name in ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")}
         parts = []
         for name, identifier in identifiers.items():

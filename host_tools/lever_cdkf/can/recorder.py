@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -14,6 +13,7 @@ import can
 
 from ..errors import LeverError
 from . import codec
+from .buses import make_room
 from .identifiers import from_bus
 from .message_counts import MessageCounter
 
@@ -23,9 +23,6 @@ _LISTEN = 0.1
 """[s] between two looks at whether to end."""
 _CONTROLLER, _BUS_OFF, _RESTARTED = 0x04, 0x40, 0x100  # classes of error frames, and conditions: <linux/can/error.h>
 _RX_OVERFLOW, _WARNING, _PASSIVE, _ACTIVE = 0x01, 0x0C, 0x30, 0x40
-_ROOM = 1 << 26
-"""[byte] for frames that wait: about 20 s of a full bus of 1 Mbit/s."""
-_SO_RCVBUFFORCE = 33  # <asm-generic/socket.h>; the module socket does not have it
 _TELL = 1.0
 """[s] between two tellings, each of which also hands to the system what has been recorded."""
 
@@ -51,7 +48,7 @@ class Recorder:
         self.partial = path.with_name(path.name + PARTIAL)
         self._bus, self._path, self._channel = bus, path, channel
         self._is_socketcan = type(bus).__name__ == "SocketcanBus"
-        self._make_room()
+        make_room(bus)
         self._start = time.monotonic()
 
     @property
@@ -84,15 +81,6 @@ class Recorder:
             raise LeverError(f"cannot write {self._path}: {error.strerror or error}; {self._kept()}") from None
         except can.CanError as error:
             raise LeverError(f"the bus failed: {error}; {self._kept()}") from None
-
-    def _make_room(self) -> None:
-        """Let frames wait while this process has no turn: a socket holds but a tenth of a second otherwise."""
-        opened = getattr(self._bus, "socket", None)
-        if isinstance(opened, socket.socket):
-            for option in (_SO_RCVBUFFORCE, socket.SO_RCVBUF):  # the first takes a privilege
-                with suppress(OSError):
-                    opened.setsockopt(socket.SOL_SOCKET, option, _ROOM)
-                    return
 
     def _kept(self) -> str:
         if not self.partial.exists():

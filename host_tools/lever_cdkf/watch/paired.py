@@ -7,17 +7,17 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..can import codec, fields
+from ..can import codec
+from ..can.bulk import FRAME
+from ..can.estimator_frames import Pairing
 from ..numeric.arrays import FloatArray
 from ..results.coherence import Coherence
 
 SPAN = 20.0
 """[s] that the coherence is measured over."""
 _REFRESH = 1.0  # [s]
-_LEVER = codec.message("LEVER_SAMPLE").frame_id
-_BASE = codec.message("BASE_SAMPLE").frame_id
+_SAMPLES = [codec.message(name).frame_id for name in ("LEVER_SAMPLE", "BASE_SAMPLE")]
 _WINDOWS_LEAST = 5
 
 
@@ -30,26 +30,24 @@ class Measured(NamedTuple):
 
 
 class Paired:
-    """A LEVER_SAMPLE belongs to the next BASE_SAMPLE if that has the same counter. Lost samples are left out."""
+    """Samples with their angle; what has none, because its LEVER_SAMPLE was lost or not valid, is left out."""
 
     def __init__(self) -> None:
-        self._lever: bytes | bytearray | None = None  # that waits for its BASE_SAMPLE
+        self._pairing = Pairing()
         self._pieces: deque[tuple[float, FloatArray]] = deque()  # when taken [s]; rows of time [us], z_ddot, theta
         self._measured: Measured | None = None
         self._measured_at = -np.inf
 
     def take(self, frames: Iterable[tuple[int, bytes | bytearray]], now: float) -> None:
         """Take what has come."""
-        pairs: list[bytes] = []
-        for identifier, data in frames:
-            if identifier == _LEVER and len(data) == 8:
-                self._lever = data
-            elif identifier == _BASE and len(data) == 8:
-                if self._lever is not None and (self._lever[1] ^ data[1]) & 15 == 0:
-                    pairs.append(bytes(self._lever) + bytes(data))
-                self._lever = None
-        if pairs:
-            self._pieces.append((now, _values(np.frombuffer(b"".join(pairs), dtype=np.uint8).reshape(-1, 16))))
+        samples = [(identifier, data) for identifier, data in frames if identifier in _SAMPLES and len(data) == 8]
+        packed = np.zeros(len(samples), FRAME)
+        packed["id"], packed["length"] = [identifier for identifier, _ in samples], 8
+        packed["data"] = np.frombuffer(b"".join(data for _, data in samples), np.uint8).reshape(-1, 8)
+        columns = self._pairing.add(packed)
+        rows = np.column_stack([columns[name] for name in ("time_us", "z_ddot", "theta")])
+        if len(rows):
+            self._pieces.append((now, rows[np.isfinite(rows[:, 2])]))
         while self._pieces and now - self._pieces[0][0] > SPAN:
             self._pieces.popleft()
 
@@ -64,20 +62,9 @@ class Paired:
         if not self._pieces:
             return None
         rows = np.vstack([piece for _, piece in self._pieces])
-        period = 1e-6 * float(np.median(np.diff(rows[:, 0]) % 2**32)) if len(rows) > 1 else 0.0
+        period = 1e-6 * float(np.median(np.diff(rows[:, 0]))) if len(rows) > 1 else 0.0
         if period <= 0.0:
             return None
         coherence = Coherence(period)
         coherence.add(rows[:, 1], rows[:, 2])
         return Measured(*coherence.spectrum(), coherence.chance()) if coherence.windows >= _WINDOWS_LEAST else None
-
-
-def _values(data: NDArray[np.uint8]) -> FloatArray:
-    """Return time [us], z_ddot [m/s²] and theta [rad] of pairs of frames; NaN: not valid. A corrupt one has no row."""
-    lever, base = np.ascontiguousarray(data[:, :8]), np.ascontiguousarray(data[:, 8:])
-    good = codec.check_columns("LEVER_SAMPLE", lever) & codec.check_columns("BASE_SAMPLE", base)
-    of_lever, of_base = fields.columns("LEVER_SAMPLE", lever), fields.columns("BASE_SAMPLE", base)
-    columns = [of_base["time_us"]]
-    for decoded, name in ((of_base, "z_ddot"), (of_lever, "theta")):
-        columns.append(np.where(decoded[f"{name}_valid"] != 0.0, decoded[name], np.nan))
-    return np.column_stack(columns)[good]

@@ -44,11 +44,7 @@ def headline(picture: Picture, source: Source) -> Text:
 
 def condition(picture: Picture, source: Source) -> Text:
     """Return how it stands, in a sentence."""
-    if source.error is not None:
-        return Text(f"● {source.error}", style=_COLOURS["bad"])
-    if source.ended:
-        return Text("● the end: nothing more will come", style=_COLOURS["watch"])
-    level, text = status.condition(picture)
+    level, text = status.of_source(picture, source)
     return Text(f"● {text}", style=_COLOURS[level])
 
 

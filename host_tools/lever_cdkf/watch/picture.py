@@ -12,7 +12,7 @@ import numpy as np
 from ..can import codec, fields
 from ..can.identity import Identity
 from ..can.message_counts import MessageCounter
-from ..firmware.config import model_parameters
+from ..firmware import quantities
 from ..firmware.estimator import FEEDTHROUGH_FREQUENCIES, fault_names
 from ..firmware.library import enum_names
 from .paired import Measured, Paired
@@ -59,9 +59,6 @@ class Feedthrough(NamedTuple):
     """Relative [1]."""
     phase_sigma: float
     """[rad]"""
-
-
-DYNAMICS = (("natural_frequency", "Hz"), ("damping_ratio", "1"))
 
 
 class Picture:
@@ -164,16 +161,17 @@ class Picture:
         """Return the parameters of the model; none before it is known."""
         if self.model is None:
             return []
-        value, sigma = "PILOT_PARAMETERS", "PILOT_SIGMA"
-        return [
-            Estimated(key, unit, self.field(value, key), self.field(sigma, f"{key}_sigma"))
-            for key, unit in model_parameters(self.model)
-        ]
+        return self._estimated(quantities.parameters(self.model), "PILOT_PARAMETERS", "PILOT_SIGMA")
 
     def dynamics(self) -> list[Estimated]:
         """Return natural frequency and damping ratio."""
-        name = "PILOT_DYNAMICS"
-        return [Estimated(key, unit, self.field(name, key), self.field(name, f"{key}_sigma")) for key, unit in DYNAMICS]
+        return self._estimated(quantities.DYNAMICS, "PILOT_DYNAMICS", "PILOT_DYNAMICS")
+
+    def _estimated(self, shown: Iterable[quantities.Quantity], values: str, sigmas: str) -> list[Estimated]:
+        return [
+            Estimated(each.key, each.unit, self.field(values, each.key), self.field(sigmas, f"{each.key}_sigma"))
+            for each in shown
+        ]
 
     def feedthrough(self) -> list[Feedthrough]:
         """θ/z̈ at each frequency that is sent."""
@@ -280,8 +278,8 @@ class Picture:
     # --- history -----------------------------------------------------------------------------------------------------
 
     def _restart_history(self) -> None:
-        keys = [key for key, _ in (*(model_parameters(self.model) if self.model else ()), *DYNAMICS)]
-        estimated = [name for key in keys for name in (key, f"{key}_sigma")]
+        shown = quantities.quantities(self.model) if self.model else quantities.DYNAMICS
+        estimated = [name for each in shown for name in (each.key, f"{each.key}_sigma")]
         names = ("time", *estimated, "nis", "excitation", "dither", "theta")
         self.history = {name: deque(maxlen=ROWS) for name in names}
 

@@ -7,18 +7,16 @@ the view takes them at its own rate. The view may therefore be as slow as it lik
 from __future__ import annotations
 
 import importlib.metadata
-import socket
 import sys
 import threading
 import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Protocol
 
 from ..can import codec
-from ..can.buses import open_bus
+from ..can.buses import make_room, open_bus
 from ..can.commander import ACCEPTED, KEEP_ALIVE, SEQUENCE, UNANSWERED, Commander, refusal, result_of
 from ..errors import LeverError
 from .picture import ERROR, FOREIGN, STEP, Frame, Picture
@@ -34,7 +32,6 @@ MOST_WAITING = 65536
 """Frames: eight seconds of a full bus of 1 Mbit/s."""
 LONGEST_PAUSE = 5.0
 """[s] A longer gap of a log is not waited for."""
-_RECEIVE_BUFFER = 1 << 22  # [bytes]
 _SWITCH_INTERVAL = 5e-4  # [s] after which drawing gives way to receiving; Python's own is ten times that
 _TRIES = 5  # of a COMMAND, KEEP_ALIVE apart: longer than a sequence lasts that another sender has left
 _LISTEN = 0.2  # [s] a receiving thread waits before it looks whether it is to end
@@ -201,7 +198,7 @@ class BusSource(Source):
         super().__init__()
         self.title = interface if channel is None else f"{interface} {channel}"
         self._bus = open_bus(interface, channel, options or {})
-        _widen(self._bus)
+        make_room(self._bus)
 
     def run(self) -> None:
         """Receive until stop() is called."""
@@ -215,13 +212,6 @@ class BusSource(Source):
         """End the thread and close the bus."""
         super().stop()
         self._bus.shutdown()
-
-    def truth(self, frequencies: FloatArray) -> tuple[dict[str, float], ComplexArray] | None:
-        """Return what is true now, which the estimator never sees; None where that is not known.
-
-        It is parameters and dynamics by name, and θ/z̈ [rad/(m/s²)] at the frequencies [Hz].
-        """
-        return None
 
     def _transmit(self, identifier: int, data: bytes) -> None:
         import can
@@ -317,14 +307,6 @@ class LogSource(Source):
             self.error = f"{self.title}: {self._log.damaged} lines of it are not frames"
         if self._log.ends_early:
             self.error = self._log.ends_early[-1]
-
-
-def _widen(bus: can.BusABC) -> None:
-    """Ask for as large a receive buffer as the kernel gives, where the bus has a socket: for when others run."""
-    own = getattr(bus, "socket", None)
-    if isinstance(own, socket.socket):
-        with suppress(OSError):
-            own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER)
 
 
 def as_frame(message: can.Message) -> Frame:

@@ -129,11 +129,7 @@ class State:
     def _present(self) -> dict[str, Any]:
         """Return how it stands."""
         picture, source = self.picture, self._source
-        level, text = status.condition(picture)
-        if source.error is not None:
-            level, text = "bad", source.error
-        elif source.ended:
-            level, text = "watch", "the end: nothing more will come"
+        level, text = status.of_source(picture, source)
         machine = None
         if picture.is_fresh("PLATFORM_HEALTH"):
             names = ("transmit_errors", "receive_errors")

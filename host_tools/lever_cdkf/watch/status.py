@@ -8,12 +8,22 @@ from ..can import codec
 from ..firmware.estimator import TEST_RATIOS
 from ..firmware.library import enum_names, enum_words
 from .picture import Picture
+from .sources import Source
 
 SELF_TESTS = {1: "program memory", 2: "RAM", 4: "stack", 8: "golden vector", 16: "settings or aircraft of its build"}
 """Bits of enum message_self_test (firmware/can/messages.h)."""
 
 SILENT_AFTER = 1.0
 """[s] without a frame after which that is said."""
+
+
+def of_source(picture: Picture, source: Source) -> tuple[str, str]:
+    """Return condition(), or what has become of the source, if that has failed or ended."""
+    if source.error is not None:
+        return "bad", source.error
+    if source.ended:
+        return "watch", "the end: nothing more will come"
+    return condition(picture)
 
 
 def condition(picture: Picture) -> tuple[str, str]:
