@@ -35,16 +35,12 @@ _ASK_S = 0.2
 _STOP_S = 5.0
 
 
-class QemuError(LeverError):
-    """An emulated board that cannot be had."""
-
-
 @contextmanager
 def running(image: Path, *, machine: str = MACHINE, count_instructions: bool = False) -> Iterator[str]:
     """Run an SLCAN image on the emulated board until the end of the context; give the channel for python-can's slcan.
 
     `machine` is QEMU's name of the board, whose first serial line is used. The image has answered when the context
-    begins. One at a time can open the channel. Raise QemuError.
+    begins. One at a time can open the channel. Raise LeverError.
     """
     check(image)
     options = ["-display", "none", "-monitor", "none", "-serial", "chardev:usart1", "-echr", _NO_ESCAPE]
@@ -84,18 +80,18 @@ def one_processor() -> Iterator[None]:
 
 
 def check(image: Path) -> None:
-    """Raise QemuError if there is no QEMU, or `image` is not a program for ARM."""
+    """Raise LeverError if there is no QEMU, or `image` is not a program for ARM."""
     if shutil.which(PROGRAM) is None:
-        raise QemuError(f"{PROGRAM} is not installed: {_INSTALL}")
+        raise LeverError(f"{PROGRAM} is not installed: {_INSTALL}")
     try:
         with image.open("rb") as file:
             head = file.read(20)
     except FileNotFoundError:
-        raise QemuError(f"no image {image}: {_BUILD}") from None
+        raise LeverError(f"no image {image}: {_BUILD}") from None
     except OSError as error:
-        raise QemuError(f"cannot read {image}: {error.strerror}") from None
+        raise LeverError(f"cannot read {image}: {error.strerror}") from None
     if head[:4] != b"\x7fELF" or head[18:20] != b"\x28\x00":  # e_machine: EM_ARM
-        raise QemuError(
+        raise LeverError(
             f"{image} is not an ELF file for ARM: give the .elf of the build, such as lever_stm32f4_slcan.elf"
         )
 
@@ -106,9 +102,9 @@ def _wait_for_answer(process: subprocess.Popen[bytes], output: IO[str], address:
     while not _answers(address):
         if process.poll() is not None:
             output.seek(0)
-            raise QemuError(f"{PROGRAM} has ended: {output.read().strip() or 'it does not say why'}")
+            raise LeverError(f"{PROGRAM} has ended: {output.read().strip() or 'it does not say why'}")
         if time.monotonic() > end:
-            raise QemuError(
+            raise LeverError(
                 f"{image} has not answered within {_START_S:g} s on its first serial line: is it the image for SLCAN, "
                 "lever_stm32f4_slcan.elf?"
             )

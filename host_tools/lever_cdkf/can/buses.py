@@ -41,6 +41,23 @@ def add_bus_options(parser: argparse.ArgumentParser) -> None:
     add_identifier_options(parser)
 
 
+def add_duration_option(parser: argparse.ArgumentParser, otherwise: str) -> None:
+    """--duration [s]; `otherwise` says when the command ends without it."""
+    parser.add_argument(
+        "--duration", metavar="SECONDS", type=_seconds, help=f"end after so long (default: {otherwise})"
+    )
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 < value < 1e9:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
+    return value
+
+
 def chosen_options(args: argparse.Namespace, *, fd: bool = False) -> dict[str, Any]:
     """Return options for open_bus(), numbers and truth values as such; raise LeverError.
 

@@ -20,23 +20,27 @@ TARGET = "stm32f405rgtx"
 INTERFACES = {"stlink": (), "cmsis-dap": (), "jlink": ("transport select swd",)}
 """Kinds of probe, by OpenOCD's name, and what it has to be told of each."""
 
-NO_PROBE = (
-    "open failed",
-    "unable to find",
-    "no j-link device found",
-    "no connected debug probe",
-    "no target device available",
-)
-NO_PERMISSION = ("libusb_error_access", "permission denied", "insufficient permissions")
-NO_TARGET = (
-    "init mode failed",
-    "target voltage may be too low",
-    "unable to connect to the target",
-    "examination failed",
-    "no ack",
-    "no cores",
-)
-NO_PACK = ("not recognized", "unknown target")
+_ADVICE = {
+    ("libusb_error_access", "permission denied", "insufficient permissions"): (
+        "{tool} may not open the probe: install its udev rules (Debian's openocd has them), and plug it in again"
+    ),
+    (
+        *("open failed", "unable to find", "no j-link device found", "no connected debug probe"),
+        "no target device available",
+    ): (
+        "no probe answers {tool}: connect an ST-LINK by USB, or name another with --probe KIND[:SERIAL] "
+        "(lsusb lists what is connected)"
+    ),
+    ("not recognized", "unknown target"): f"this pyOCD does not know the chip yet: pyocd pack install {TARGET}",
+    (
+        *("init mode failed", "target voltage may be too low", "unable to connect to the target"),
+        *("examination failed", "no ack", "no cores"),
+    ): (
+        "the probe is there, but no STM32F405 answers {tool}: is the board powered, and are SWDIO, SWCLK and GND "
+        "connected?"
+    ),
+}
+"""What to do about a failure, by words (in lower case) that the tool says of it; the first that fits."""
 
 _DESCRIPTION = """\
 Writes an image into the flash of an STM32F405 through a debug probe (SWD), verifies it, and starts it. Uses OpenOCD or
@@ -163,20 +167,7 @@ def _run(command: list[str]) -> tuple[int, str]:
 
 def _advice(tool: str, output: str) -> str:
     """Return what to do about a failure, by what the tool has said (in lower case)."""
-    if any(phrase in output for phrase in NO_PERMISSION):
-        return (
-            f"{tool} may not open the probe: install its udev rules (Debian's openocd has them), and plug it in again"
-        )
-    if any(phrase in output for phrase in NO_PROBE):
-        return (
-            f"no probe answers {tool}: connect an ST-LINK by USB, or name another with --probe KIND[:SERIAL] "
-            "(lsusb lists what is connected)"
-        )
-    if any(phrase in output for phrase in NO_PACK):
-        return f"this pyOCD does not know the chip yet: pyocd pack install {TARGET}"
-    if any(phrase in output for phrase in NO_TARGET):
-        return (
-            f"the probe is there, but no STM32F405 answers {tool}: is the board powered, and are SWDIO, SWCLK and GND "
-            "connected?"
-        )
+    for phrases, advice in _ADVICE.items():
+        if any(phrase in output for phrase in phrases):
+            return advice.format(tool=tool)
     return f"{tool} could not write the flash; what it says is above"

@@ -7,6 +7,7 @@ import importlib.metadata
 from typing import Any
 
 from ..fmu.options import add_out_option, print_written
+from .options import add_aircraft_option, add_setting_options, chosen_aircraft, chosen_assignments
 
 FMUS = "lever_cdkf.fmus"
 """Entry point group of modules with further kinds of FMU: add_parser(subparsers), run(args) as of a command."""
@@ -58,16 +59,9 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "controller", help="the estimator", description=_CONTROLLER, epilog=_CONTROLLER_EPILOG
     )
     add_out_option(controller, "lever.fmu")
-    controller.add_argument("--settings", metavar="FILE", help="start from the values in a settings file")
-    controller.add_argument(
-        "--set", metavar="NAME=VALUE", action="append", default=[], help="set one value; may be repeated"
-    )
+    add_setting_options(controller)
     controller.add_argument("--model", help="short for --set model=MODEL")
-    controller.add_argument(
-        "--aircraft",
-        metavar="AIRCRAFT",
-        help="watch the margin to collective bounce with this helicopter, as `lever replay --aircraft` does",
-    )
+    add_aircraft_option(controller)
     controller.add_argument(
         "--bus",
         action="store_true",
@@ -83,16 +77,12 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run `lever fmu`; return the exit status."""
-    from ..firmware.settings_file import make_config, parse_assignment, read_assignments
+    from ..firmware.settings_file import make_config
     from ..fmu import archive
     from ..fmu.controller import controller
-    from .signal_options import chosen_aircraft
 
     archive.check(args.out)
-    assignments = read_assignments(args.settings) if args.settings is not None else {}
-    model = [] if args.model is None else [f"model={args.model}"]
-    assignments |= dict(parse_assignment(text) for text in (*model, *args.set))
-    aircraft = None if args.aircraft is None else chosen_aircraft(args.aircraft)
-    archive.write(args.out, controller(make_config(assignments), aircraft, args.bus))
+    config, aircraft = make_config(chosen_assignments(args)), chosen_aircraft(args)
+    archive.write(args.out, controller(config, aircraft, args.bus))
     print_written(args.out)
     return 0

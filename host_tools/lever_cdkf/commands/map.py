@@ -12,7 +12,7 @@ from ..cli import layout
 from ..cli.tables import Row, add_json_option
 from ..errors import LeverError
 from ..runtime.files import check_not_input
-from .signal_options import add_part_options, check_part
+from .options import add_part_options, check_part
 
 if TYPE_CHECKING:
     from ..signals.mapping import Mapping

@@ -11,11 +11,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options, open_bus
+from ..can.buses import add_bus_options, add_duration_option, check_others_can_be_heard, chosen_options, open_bus
 from ..cli.layout import say
 from ..cli.tables import Row, Tables, add_json_option
 from ..errors import LeverError
-from .signal_options import add_signal_options, input_files
+from .options import add_signal_options, input_files
 
 if TYPE_CHECKING:
     from ..can.recorder import Recorder
@@ -48,7 +48,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     add_bus_options(parser)
     parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="the log (default: lever_DATE_TIME.log)")
-    parser.add_argument("--duration", metavar="SECONDS", type=_seconds, help="end after so long (default: at Ctrl-C)")
+    add_duration_option(parser, "at Ctrl-C")
     add_signal_options(parser, part=False)
     add_json_option(parser)
 
@@ -118,13 +118,6 @@ def _mapped(log: Path, reading: Reading | None) -> Tables:
     messages: list[Row] = [{"message": name, **vars(counts)} for name, counts in summary.messages.items()]
     signals: list[Row] = [{"input": key, **vars(each)} for key, each in summary.inputs.items()]
     return {"signals": signals, "mapped messages": messages}
-
-
-def _seconds(text: str) -> float:
-    seconds = float(text)
-    if not 0.0 < seconds < float("inf"):
-        raise ValueError
-    return seconds
 
 
 @contextmanager

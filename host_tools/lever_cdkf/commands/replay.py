@@ -13,12 +13,11 @@ from ..cli.formats import add_format_option, chosen_formats
 from ..cli.layout import say
 from ..cli.tables import Row, Tables, add_json_option
 from ..runtime.files import check_not_input
-from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_aircraft, chosen_reading, input_files
+from . import options
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..firmware.settings_file import Assignments
     from ..replay.engine import Options
     from ..results.summary import ReplaySummary
 
@@ -40,7 +39,7 @@ with --each as separate recordings. Other messages, other buses and damaged line
 also holds estimates, of the firmware that ran when it was recorded and by this version of lever.dbc (IDENTITY says so),
 they are compared with the new ones, signal by signal.
 
-{MAP_HELP}
+{options.MAP_HELP}
 The settings are the firmware's defaults, changed by --settings and --set; `lever tune` finds those of a log. COMMAND
 frames in the log are obeyed, except for a choice (model, preload, estimator, adaptation, mitigation) that is made here.
 Mapped signals set sample_period.
@@ -77,21 +76,9 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     for what in ("model", "preload", "estimator", "adaptation", "mitigation"):
         parser.add_argument(f"--{what}", help=f"choose the {what}, whatever the log says (`lever settings` lists them)")
-    parser.add_argument("--settings", metavar="FILE", help="start from the values in a settings file")
-    parser.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        help="set one value; may be repeated, the last counts",
-    )
-    parser.add_argument(
-        "--aircraft",
-        metavar="AIRCRAFT",
-        help="watch the margin to collective bounce with this helicopter: one of `lever aircraft`, changed by "
-        ",KEY=VALUE as there, or a file that it writes",
-    )
-    add_signal_options(parser)
+    options.add_setting_options(parser)
+    options.add_aircraft_option(parser)
+    options.add_signal_options(parser)
     add_format_option(parser)
     add_json_option(parser)
 
@@ -107,12 +94,12 @@ def run(args: argparse.Namespace) -> int:
     check_not_input(args.json, args.logs)
     if args.each:
         return _run_each(args)
-    options = _options(args, args.logs[0], chosen_formats(args))
+    asked = _options(args, args.logs[0], chosen_formats(args))
     with Progress("replay") as progress:
-        summary = replay(args.logs, options, args.out, progress.show)
+        summary = replay(args.logs, asked, args.out, progress.show)
     if summary.warning and args.json is None:
         say(f"{summary.warning}\n")
-    print_tables(_tables(summary), args.json, inputs=[*args.logs, *input_files(args)])
+    print_tables(_tables(summary), args.json, inputs=[*args.logs, *options.input_files(args)])
     say(summary.verdict)
     if args.out is not None:
         say(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
@@ -128,16 +115,16 @@ def _run_each(args: argparse.Namespace) -> int:
     from ..replay.each import replay_each, rows_of, write
     from ..signals.mapping import read_mapping
 
-    make_config(_assignments(args))  # what is wrong with the command line is wrong for all
+    make_config(options.chosen_assignments(args))  # what is wrong with the command line is wrong for all
     if args.map:
         read_mapping(args.map)
-    check_part(args)
+    options.check_part(args)
     formats = chosen_formats(args)
     with Progress("replay") as progress:
         replays = replay_each(args.logs, lambda log: _options(args, log, formats), args.out, progress.show)
-    print_tables({"logs": rows_of(replays)}, args.json, inputs=[*args.logs, *input_files(args)])
+    print_tables({"logs": rows_of(replays)}, args.json, inputs=[*args.logs, *options.input_files(args)])
     if args.out is not None:
-        written = write(replays, args.out, input_files(args))
+        written = write(replays, args.out, options.input_files(args))
         say(f"Written to {args.out}: {', '.join([*written, 'a folder for each log'])}")
     for each in replays:
         if each.problem:
@@ -150,39 +137,28 @@ def _options(args: argparse.Namespace, log: str, formats: Sequence[str]) -> Opti
     from ..firmware.settings_file import make_config
     from ..replay.engine import Options
 
-    assignments = _assignments(args)
+    assignments = options.chosen_assignments(args)
     chosen_here = {what: str(name) for what, name in assignments.items() if what in CHOICES}
-    reading = chosen_reading(args, log)
+    reading = options.chosen_reading(args, log)
     return Options(
-        *(make_config(assignments), chosen_here, args.channel, reading, *check_part(args)),
+        *(make_config(assignments), chosen_here, args.channel, reading, *options.check_part(args)),
         formats=formats,
-        aircraft=None if args.aircraft is None else chosen_aircraft(args.aircraft),
-        inputs=input_files(args),
+        aircraft=options.chosen_aircraft(args),
+        inputs=options.input_files(args),
         tune_command=_tune_command(args, log),
     )
 
 
 def _tune_command(args: argparse.Namespace, log: str) -> str:
     """Return how `lever tune` reads the same."""
-    options = {"--dbc": args.dbc, "--clock": args.clock, "--channel": args.channel, "--settings": args.settings}
-    words = ["lever", "tune", *([log] if args.each else args.logs)]
-    words += [word for option, value in options.items() if value is not None for word in (option, value)]
-    words += ["--map", *args.map] if args.map else []
-    words += ["--start", f"{args.start:g}"] if args.start else []
-    words += ["--length", f"{args.length:g}"] if args.length is not None else []
-    return " ".join(map(shlex.quote, [*words, "-o", "my.settings"]))
-
-
-def _assignments(args: argparse.Namespace) -> Assignments:
-    from ..firmware.config import CHOICES
-    from ..firmware.settings_file import parse_assignment, read_assignments
-
-    assignments = read_assignments(args.settings) if args.settings is not None else {}
-    assignments |= dict(parse_assignment(text) for text in args.set)
-    for what in CHOICES:
-        if (chosen := getattr(args, what)) is not None:
-            assignments |= dict([parse_assignment(f"{what}={chosen}")])
-    return assignments
+    given = {
+        "--settings": args.settings,
+        "--start": f"{args.start:g}" if args.start else None,
+        "--length": None if args.length is None else f"{args.length:g}",
+        "-o": "my.settings",
+    }
+    logs = [log] if args.each else args.logs
+    return shlex.join(["lever", "tune", *options.reading_words(args, logs, args.map), *options.option_words(given)])
 
 
 def _tables(summary: ReplaySummary) -> Tables:

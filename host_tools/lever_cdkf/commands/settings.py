@@ -8,6 +8,7 @@ import sys
 from typing import Any
 
 from ..cli.tables import Row, add_json_option
+from .options import add_setting_options, chosen_assignments
 
 _DESCRIPTION = """\
 Without --set and --settings: prints every setting of the estimator with unit, default, range and meaning, after the
@@ -32,25 +33,16 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         description=_DESCRIPTION,
         epilog=_EPILOG,
     )
-    parser.add_argument("--settings", metavar="FILE", help="start from the values in a settings file")
-    parser.add_argument(
-        "--set",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        help="set one value; may be repeated, the last counts, and all take precedence over --settings",
-    )
+    add_setting_options(parser)
     add_json_option(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run `lever settings`; return the exit status."""
     from ..cli.tables import print_tables, write_json
-    from ..firmware.settings_file import format_config, make_config, parse_assignment, read_assignments
+    from ..firmware.settings_file import format_config, make_config
 
-    assignments = read_assignments(args.settings) if args.settings is not None else {}
-    assignments |= dict(parse_assignment(text) for text in args.set)
-    config = make_config(assignments)
+    config = make_config(chosen_assignments(args))
     if args.settings is None and not args.set:
         print_tables({"settings": _rows()}, args.json, digits=6)
         return 0

@@ -17,7 +17,7 @@ from ..cli.tables import Row, Tables, add_json_option
 from ..errors import LeverError
 from ..runtime.extras import require
 from ..runtime.files import check_not_input, check_writable
-from .signal_options import MAP_HELP, add_signal_options, chosen_reading, input_files
+from . import options
 
 if TYPE_CHECKING:
     from ..firmware.settings_file import Assignments
@@ -48,7 +48,7 @@ What is printed: the settings with units (sigma: standard deviation), and for bo
   NIS     normalised innovation squared per output [1]: 1 where the stated uncertainty is right, above: too certain
   corr.   largest autocorrelation of the rate's innovations at lags up to 0.5 s [1]: near 0 where the model fits
 
-{MAP_HELP}"""
+{options.MAP_HELP}"""
 _EPILOG = """\
 examples:
   lever sim steady --out out/steady                        a log, out/steady/bus.log
@@ -73,18 +73,14 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     add_identifier_options(parser)
     parser.add_argument("-o", "--output", metavar="FILE", type=Path, help="write the settings file here")
     parser.add_argument("--page", metavar="FILE", type=Path, help="write before and after as a page for a browser")
-    parser.add_argument("--settings", metavar="FILE", help="start from a settings file (default: the firmware's)")
-    parser.add_argument(
-        "--set", metavar="NAME=VALUE", action="append", default=[], help="and from this value; may be repeated"
-    )
+    options.add_setting_options(parser)
     parser.add_argument(
         "--keep", metavar="NAME", action="append", default=[], help="a setting that is not touched; may be repeated"
     )
     parser.add_argument(
         "--channel", metavar="NAME", help="the bus with the samples (default: the only one that has any)"
     )
-    parser.add_argument("--start", metavar="S", type=float, default=0.0, help="first second used (default: 0)")
-    parser.add_argument("--length", metavar="S", type=float, default=600.0, help="seconds used (default: %(default)g)")
+    options.add_part_options(parser, 600.0)
     parser.add_argument(
         "--held-out",
         metavar="SHARE",
@@ -92,7 +88,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         default=0.3,
         help="share of it, at its end, that is not tuned on (default: %(default)g; 0: all is tuned on)",
     )
-    add_signal_options(parser, part=False)
+    options.add_signal_options(parser, part=False)
     add_json_option(parser)
 
 
@@ -111,7 +107,7 @@ def run(args: argparse.Namespace) -> int:
 
     before = _settings(args)
     with Progress("tune") as progress:
-        reading = chosen_reading(args, args.log[0])
+        reading = options.chosen_reading(args, args.log[0])
         recording = read(args.log, args.channel, args.start, args.length, progress.show, reading)
         before = _as_recorded(before, recording)
         likelihood = Likelihood(recording, args.held_out)
@@ -134,7 +130,7 @@ def run(args: argparse.Namespace) -> int:
 def _settings(args: argparse.Namespace) -> Assignments:
     """Return what to start from. Raise LeverError for that and for every other argument that is wrong."""
     from ..firmware.config import setting
-    from ..firmware.settings_file import make_config, parse_assignment, read_assignments
+    from ..firmware.settings_file import make_config
 
     if not 0.0 <= args.held_out <= 0.8:
         raise LeverError(f"--held-out {args.held_out:g}: must be from 0 to 0.8")
@@ -143,10 +139,8 @@ def _settings(args: argparse.Namespace) -> Assignments:
             check_writable(path)
     for path in (args.output, args.page, args.json):
         check_not_input(path, args.log)
-    if args.start < 0.0 or not args.length > 0.0:
-        raise LeverError(f"--start {args.start:g} --length {args.length:g}: seconds, and length must be more than 0")
-    assignments = read_assignments(args.settings) if args.settings is not None else {}
-    assignments |= dict(parse_assignment(text) for text in args.set)
+    options.check_part(args)
+    assignments = options.chosen_assignments(args)
     make_config(assignments)
     for name in args.keep:
         setting(name)
@@ -203,7 +197,7 @@ def _conclude(
         tables = {"calibration": [_calibration_row(entry) for entry in calibration.entries], **tables}
     changed = sum(entry.after != entry.before for entry in tuned) + len(calibration.assignments)
     verdict = validation.verdict(fits, changed)
-    inputs = [*args.log, *input_files(args)]
+    inputs = [*args.log, *options.input_files(args)]
     origin = provenance(inputs)
     print_tables(tables, args.json, inputs=inputs)
     if after.get("change_walk") != before.get("change_walk"):
@@ -239,7 +233,7 @@ def _refuse(args: argparse.Namespace, likelihood: Likelihood, calibration: Calib
     from ..tune.search import NOISE
 
     tables: Tables = {"calibration": [_calibration_row(entry) for entry in calibration.entries]}
-    print_tables(tables, args.json, inputs=[*args.log, *input_files(args)])
+    print_tables(tables, args.json, inputs=[*args.log, *options.input_files(args)])
     say(f"{_subtitle(args, likelihood)} {calibration.text}")
     begin, length = likelihood.longest_calm()
     kept = [name for name in args.keep if name in NOISE]
@@ -284,31 +278,23 @@ def _say_next(command: str) -> None:
 
 def _replay(args: argparse.Namespace, mapping: Path | None) -> str:
     """Return the command that flies the log with what was found."""
-    words = ["lever", "replay", *_log_words(args, args.map if mapping is None else [str(mapping)])]
-    return shlex.join([*words, "--settings", str(args.output)])
+    words = options.reading_words(args, args.log, args.map if mapping is None else [str(mapping)])
+    return shlex.join(["lever", "replay", *words, "--settings", str(args.output)])
 
 
 def _tune(args: argparse.Namespace, start: int, length: int) -> str:
     """Return the same command, of another part of the log."""
-    given = {"--settings": args.settings, "-o": args.output, "--page": args.page}
-    words = ["lever", "tune", *_log_words(args, args.map), "--start", str(start), "--length", str(length)]
-    words += [word for option, value in given.items() if value is not None for word in (option, str(value))]
+    given = {
+        "--start": start,
+        "--length": length,
+        "--settings": args.settings,
+        "-o": args.output,
+        "--page": args.page,
+    }
+    words = ["lever", "tune", *options.reading_words(args, args.log, args.map), *options.option_words(given)]
     words += [word for text in args.set for word in ("--set", text)]
     words += [word for name in args.keep for word in ("--keep", name)]
     return shlex.join(words)
-
-
-def _log_words(args: argparse.Namespace, mapping: Sequence[str]) -> list[str]:
-    """Return the log and how it is read, as arguments."""
-    given = {
-        "--dbc": args.dbc,
-        "--channel": args.channel,
-        "--clock": args.clock,
-        "--id-offset": args.id_offset,
-        "--id-base": args.id_base,
-    }
-    words = [word for option, value in given.items() if value is not None for word in (option, str(value))]
-    return [*args.log, *words, *(["--map", *mapping] if mapping else [])]
 
 
 def _subtitle(args: argparse.Namespace, likelihood: Likelihood) -> str:

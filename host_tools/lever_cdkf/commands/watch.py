@@ -6,10 +6,10 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from ..can.buses import add_bus_options, check_others_can_be_heard, chosen_options
+from ..can.buses import add_bus_options, add_duration_option, check_others_can_be_heard, chosen_options
 from ..errors import LeverError
 from ..runtime.extras import require
-from .signal_options import MAP_HELP, add_signal_options, check_part, chosen_aircraft, chosen_reading
+from . import options
 
 if TYPE_CHECKING:
     from ..firmware.config import Config
@@ -26,7 +26,7 @@ Instead of a bus, LOG is played at the pace it was recorded at, or the pilot of 
 A bus or log without an estimator, with other messages: the firmware in this process estimates from mapped signals. On a
 bus these are looked at for two seconds first.
 
-{MAP_HELP}"""
+{options.MAP_HELP}"""
 _MONITOR_EPILOG = """\
 keys: q quits, space holds the picture, t changes the time span of the trends, f shows or hides the feedthrough (shown
 from 32 lines on), c clears the counts
@@ -71,12 +71,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     )
     _add_source(monitor)
     monitor.add_argument("--once", action="store_true", help="print one picture as plain text and end")
-    monitor.add_argument(
-        "--duration",
-        metavar="SECONDS",
-        type=_seconds,
-        help="end after so long (default: never; with --once: listen for 2 s)",
-    )
+    add_duration_option(monitor, "never; with --once: listen for 2 s")
     monitor.set_defaults(run=run_monitor)
     live = subparsers.add_parser(
         "live", help="watch and control the estimator in a browser", description=_LIVE, epilog=_LIVE_EPILOG
@@ -86,7 +81,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     live.add_argument("--host", default="127.0.0.1", help="address to listen at (default: %(default)s, this computer)")
     live.add_argument("--port", type=_port, default=PORT, help="default: %(default)s; 0 takes any that is free")
     live.add_argument("--read-only", action="store_true", help="without controls: no frame is ever sent")
-    live.add_argument("--duration", metavar="SECONDS", type=_seconds, help="end after so long (default: never)")
+    add_duration_option(live, "never")
     live.set_defaults(run=run_live)
 
 
@@ -99,12 +94,8 @@ def _add_source(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--scenario", metavar="NAME", help="simulate a scenario of `lever sim --list` or a .toml file")
     add_bus_options(parser)
-    add_signal_options(parser)
-    parser.add_argument(
-        "--aircraft",
-        metavar="AIRCRAFT",
-        help="with mapped signals: watch the margin to collective bounce, as `lever replay` does",
-    )
+    options.add_signal_options(parser)
+    options.add_aircraft_option(parser, "with mapped signals: ")
 
 
 def run_monitor(args: argparse.Namespace) -> int:
@@ -148,7 +139,7 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
         what = "nothing to watch" if not given else f"{' and '.join(given)} at once"
         raise LeverError(f"{what}: give a LOG, --scenario NAME, or --interface and --channel of a bus, one of them")
     settings = getattr(args, "settings", None)
-    aircraft = None if args.aircraft is None else chosen_aircraft(args.aircraft)
+    aircraft = options.chosen_aircraft(args)
     if args.scenario is not None:
         from ..watch.sources import simulated
 
@@ -162,7 +153,7 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
     from ..watch.sources import BusSource, LogSource
 
     config = Config() if settings is None else make_config(read_assignments(settings))
-    if args.log is not None and (reading := chosen_reading(args, args.log)) is not None:
+    if args.log is not None and (reading := options.chosen_reading(args, args.log)) is not None:
         from ..watch.mapped import MappedLogSource
 
         return MappedLogSource(args.log, reading, config, aircraft), config
@@ -175,24 +166,14 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
             raise LeverError("a bus needs both --dbc FILE and --map KEY=MESSAGE.SIGNAL")
         online = Online(read_mapping(args.map), args.dbc, args.clock)
         check_others_can_be_heard(args.interface)
-        options = chosen_options(args, fd=online.fd)
-        return MappedBusSource(args.interface, args.channel, online, config, options, aircraft), config
+        of_bus = chosen_options(args, fd=online.fd)
+        return MappedBusSource(args.interface, args.channel, online, config, of_bus, aircraft), config
     if aircraft is not None:
         raise LeverError("--aircraft goes with --map: an estimator on the bus has its own (`lever_can --aircraft`)")
     if args.log is not None:
-        return LogSource(args.log, args.channel, part=check_part(args)), config
+        return LogSource(args.log, args.channel, part=options.check_part(args)), config
     check_others_can_be_heard(args.interface)
     return BusSource(args.interface, args.channel, chosen_options(args)), config
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0.0 < value < 1e9:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds above 0")
-    return value
 
 
 def _port(text: str) -> int:

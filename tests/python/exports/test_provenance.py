@@ -15,7 +15,7 @@ from pathlib import Path
 import lever_cdkf
 import pytest
 from lever_cdkf.cli.main import main
-from lever_cdkf.commands.signal_options import input_files
+from lever_cdkf.commands.options import input_files
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime import provenance as origin
 from lever_cdkf.runtime.files import LIBRARY_DIR, native_file, shared_library

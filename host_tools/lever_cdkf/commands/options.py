@@ -1,9 +1,10 @@
-"""The options that say how samples are made of logs and files that do not speak lever.dbc."""
+"""Options that several commands have: settings, aircraft, and how samples are made of logs with other messages."""
 
 from __future__ import annotations
 
 import argparse
 import importlib.metadata
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from ..errors import LeverError
 
 if TYPE_CHECKING:
     from ..firmware.aircraft import AircraftResponse
+    from ..firmware.settings_file import Assignments
     from ..signals.reading import Reading
 
 AIRCRAFT = "lever_cdkf.aircraft"
@@ -28,6 +30,29 @@ guessed, and the guess is printed. Gravity is recognised and subtracted. To set 
 has a blank). Instead of KEY=SIGNAL, a .toml file may hold the same, and how messages are protected (E2E); `lever map`
 proposes one.
 """
+
+
+def add_setting_options(parser: argparse.ArgumentParser) -> None:
+    """Add --settings and --set."""
+    parser.add_argument("--settings", metavar="FILE", help="start from the values in a settings file")
+    parser.add_argument(
+        "--set",
+        metavar="NAME=VALUE",
+        action="append",
+        default=[],
+        help="set one value; may be repeated, the last counts, and all take precedence over --settings",
+    )
+
+
+def chosen_assignments(args: argparse.Namespace) -> Assignments:
+    """Return what they set, and a choice that has an option of its own, such as --model; raise SettingsError."""
+    from ..firmware.config import CHOICES
+    from ..firmware.settings_file import parse_assignment, read_assignments
+
+    assignments = read_assignments(args.settings) if args.settings is not None else {}
+    choices = {what: chosen for what in CHOICES if (chosen := getattr(args, what, None)) is not None}
+    texts = [*args.set, *(f"{what}={chosen}" for what, chosen in choices.items())]
+    return assignments | dict(map(parse_assignment, texts))
 
 
 def add_signal_options(parser: argparse.ArgumentParser, *, part: bool = True) -> None:
@@ -66,6 +91,23 @@ def check_part(args: argparse.Namespace) -> tuple[float, float]:
     return args.start, length
 
 
+def reading_words(args: argparse.Namespace, logs: Sequence[str], mapping: Sequence[str]) -> list[str]:
+    """Return logs and how they are read, as arguments of another command; `mapping` in the place of --map."""
+    options = {
+        "--dbc": args.dbc,
+        "--channel": args.channel,
+        "--clock": args.clock,
+        "--id-offset": args.id_offset,
+        "--id-base": args.id_base,
+    }
+    return [*logs, *option_words(options), *(["--map", *mapping] if mapping else [])]
+
+
+def option_words(options: Mapping[str, object]) -> list[str]:
+    """Return options with their values, as arguments; those that are None are left out."""
+    return [word for option, value in options.items() if value is not None for word in (option, str(value))]
+
+
 def input_files(args: argparse.Namespace) -> list[str]:
     """Return the files that the options name: settings, database, mappings, aircraft."""
     aircraft = getattr(args, "aircraft", None) or ""
@@ -74,13 +116,26 @@ def input_files(args: argparse.Namespace) -> list[str]:
     return [path for path in named if path is not None] + [each for each in args.map if each.lower().endswith(".toml")]
 
 
-def chosen_aircraft(text: str) -> AircraftResponse:
+def add_aircraft_option(parser: argparse.ArgumentParser, when: str = "") -> None:
+    """--aircraft; `when` says with what it goes."""
+    parser.add_argument(
+        "--aircraft",
+        metavar="AIRCRAFT",
+        help=f"{when}watch the margin to collective bounce with this helicopter: one of `lever aircraft`, changed by "
+        ",KEY=VALUE as there, or a file that it writes",
+    )
+
+
+def chosen_aircraft(args: argparse.Namespace) -> AircraftResponse | None:
     """Return the response in a file, or of NAME[,KEY=VALUE…] by the package that knows aircraft; raise LeverError.
 
     NAME may also be a file that the package reads.
     """
     from ..firmware.aircraft import read_response
 
+    text = args.aircraft
+    if text is None:
+        return None
     if Path(text).is_file() and not text.lower().endswith(_OF_PACKAGE):
         return read_response(text)
     name, *changes = text.split(",")
