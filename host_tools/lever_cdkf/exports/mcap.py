@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,23 +18,23 @@ from numpy.typing import NDArray
 from ..can import codec
 from ..results.trace import Trace
 from ..runtime.extras import require
-from ..runtime.files import writing
+from ..runtime.files import Growing, writing
 from .columns import RECORDED, TEXT, Column, as_words, together
 from .head import Head
 
 _DIGITS = 9
 
 
-class Mcap:
-    """Written a piece at a time; complete after close()."""
+class Mcap(Growing):
+    """A message for each sample of each topic."""
 
     def __init__(self, path: Path, head: Head) -> None:
         require("files", "mcap")
         from mcap.writer import Writer
 
-        self._path, self._head = path, head
+        super().__init__(path)
+        self._head = head
         with writing(path):
-            self._file = path.open("wb")
             self._writer: Any = Writer(self._file)
             self._writer.start(profile="", library=f"{head.properties['software']} {head.properties['version']}")
             self._writer.add_metadata("provenance", dict(head.properties))
@@ -63,16 +62,9 @@ class Mcap:
             for at, name, text in messages:
                 self._writer.add_message(self._channel(name), at, text, at)
 
-    def close(self) -> None:
+    def _finish(self) -> None:
         """Write the index."""
-        with writing(self._path):
-            self._writer.finish()
-            self._file.close()
-
-    def abandon(self) -> None:
-        """Let go of the file."""
-        with suppress(OSError):
-            self._file.close()
+        self._writer.finish()
 
 
 def _objects(trace: Trace, rows: NDArray[np.intp], described: list[Column]) -> Iterator[bytes]:

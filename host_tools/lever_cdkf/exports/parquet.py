@@ -16,20 +16,20 @@ from numpy.typing import NDArray
 from ..numeric.arrays import FloatArray
 from ..results.trace import WHOLE, Trace
 from ..runtime.extras import require
-from ..runtime.files import writing
+from ..runtime.files import Growing, writing
 from .columns import TEXT, as_words
 from .head import Head
 
 
-class Parquet:
-    """Written a piece at a time; complete after close()."""
+class Parquet(Growing):
+    """A row for each sample."""
 
     def __init__(self, path: Path, head: Head) -> None:
         require("files", "pyarrow")
         import pyarrow
         from pyarrow import parquet
 
-        self._path = path
+        super().__init__(path)
         described = [("time_s", "s", "Since the first sample.")]
         described += [(column.source, column.unit, column.comment) for column in head.columns]
         fields = [
@@ -38,7 +38,6 @@ class Parquet:
         ]
         self._schema = pyarrow.schema(fields, metadata=dict(head.properties))
         with writing(path):
-            self._file = path.open("wb")
             self._writer: Any = parquet.ParquetWriter(self._file, self._schema)
 
     def add(self, trace: Trace, _published: NDArray[np.bool_], _recorded: NDArray[np.bool_]) -> None:
@@ -49,17 +48,15 @@ class Parquet:
         with writing(self._path):
             self._writer.write_table(pyarrow.table(arrays, schema=self._schema))
 
-    def close(self) -> None:
+    def _finish(self) -> None:
         """Write the index."""
-        with writing(self._path):
-            self._writer.close()
-            self._file.close()
+        self._writer.close()
 
     def abandon(self) -> None:
-        """Let go of the file."""
-        for part in (self._file, self._writer):
-            with suppress(Exception):
-                part.close()
+        """Let go of it."""
+        super().abandon()
+        with suppress(Exception):
+            self._writer.close()
 
 
 def _kind(column: str) -> Any:

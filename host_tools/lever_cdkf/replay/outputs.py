@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -11,7 +10,7 @@ from ..can import bulk
 from ..can.bulk import Frames
 from ..cli.formats import FORMATS
 from ..exports.signal_files import SignalFiles
-from ..runtime.files import Outputs, writing
+from ..runtime.files import Growing, Outputs, writing
 from ..runtime.provenance import Provenance
 
 BUS_LOG, SUMMARY = "bus.log", "summary.json"
@@ -52,22 +51,13 @@ class Folder:
             self._bus_log.abandon()
 
 
-class _BusLog:
+class _BusLog(Growing):
     """bus.log: what the estimator got and what it answered, in candump's format."""
 
     def __init__(self, path: Path, channel: str) -> None:
-        self._path, self._channel = path, channel
-        with writing(path):
-            self._file = path.open("wb")
+        super().__init__(path)
+        self._channel = channel
 
     def add(self, frames: Frames) -> None:
         with writing(self._path):
             self._file.write(bulk.format_lines(frames, self._channel).data)
-
-    def close(self) -> None:
-        with writing(self._path):
-            self._file.close()
-
-    def abandon(self) -> None:
-        with suppress(OSError):
-            self._file.close()

@@ -63,21 +63,8 @@ class RecordedRun(Run):
     def __init__(self, kept: Kept, summary: ReplaySummary) -> None:
         super().__init__(kept.stretches.rows(), summary)
         self._kept = kept
-
-    @property
-    def samples(self) -> int:
-        """Number of samples."""
-        return self._kept.samples
-
-    @property
-    def end(self) -> float:
-        """Time of the last sample [s]."""
-        return self._kept.end
-
-    @cached_property
-    def sample_period(self) -> float:
-        """[s]."""
-        return self._kept.sample_period
+        self.samples, self.end, self.sample_period = kept.samples, kept.end, kept.sample_period
+        self.feedthrough, self.test_ratios, self.coherence = kept.feedthrough, kept.test_ratios, kept.coherence
 
     def close_up(self, start: float, seconds: float) -> Mapping[str, FloatArray]:
         """Return the columns of the trace near a time [s]."""
@@ -96,21 +83,6 @@ class RecordedRun(Run):
     def spectrum(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Return frequencies [Hz] and power spectral density of a column [unit²/Hz]."""
         return self._kept.spectra[name].spectrum()
-
-    @cached_property
-    def feedthrough(self) -> Feedthrough:
-        """Estimated feedthrough over the recording."""
-        return self._kept.feedthrough
-
-    @cached_property
-    def test_ratios(self) -> TestRatios:
-        """Statistics of the evidence over their thresholds [1]."""
-        return self._kept.test_ratios
-
-    @cached_property
-    def coherence(self) -> Coherence:
-        """Coherence of base and lever by frequency."""
-        return self._kept.coherence
 
     @cached_property
     def followed_trim(self) -> FloatArray | None:

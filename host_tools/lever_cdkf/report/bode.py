@@ -76,7 +76,7 @@ def magnitude_and_phase(response: ComplexArray) -> tuple[Array, Array]:
     return np.abs(response), np.degrees(np.unwrap(np.angle(along))) + start
 
 
-def slow_trim(time: Array, theta: Array, corner: float, longest_step: float = LONGEST_STEP) -> Array:
+def slow_trim(time: Array, theta: Array, corner: float) -> Array:
     """Return the estimator's own idea of the trim angle [rad]: the slow part of θ, held over gaps (NaN).
 
     `corner`: [Hz].
@@ -86,6 +86,6 @@ def slow_trim(time: Array, theta: Array, corner: float, longest_step: float = LO
     level = Detrend(float(measured[0]) if measured.size else 0.0)
     for index, (gap, angle) in enumerate(zip(np.diff(time, prepend=time[0]).tolist(), theta.tolist(), strict=True)):
         if angle == angle:
-            level.step(angle, corner, min(gap, longest_step))
+            level.step(angle, corner, min(gap, LONGEST_STEP))
         trim[index] = level.level
     return trim

@@ -58,7 +58,7 @@ def _trace(x: Array, y: Array, name: str, row: int) -> Spec:
     return {"type": "scatter", "x": packed(x), "y": packed(y), "name": name, "yaxis": axis} | hover
 
 
-def axis_range(columns: list[Array], settled: slice, share: float = 0.08, zero: bool = False) -> list[float] | None:
+def axis_range(columns: list[Array], settled: slice, share: float = 0.08) -> list[float] | None:
     """Return an axis range that shows all that the columns do in `settled`.
 
     So a wild start does not squeeze the rest.
@@ -68,9 +68,8 @@ def axis_range(columns: list[Array], settled: slice, share: float = 0.08, zero: 
     if not values.size:
         return None
     low, high = float(values.min()), float(values.max())
-    low = min(low, 0.0) if zero else low
     margin = share * ((high - low) or abs(high) or 1.0)
-    return [0.0 if zero and low == 0.0 else low - margin, high + margin]
+    return [low - margin, high + margin]
 
 
 @dataclass

@@ -5,7 +5,7 @@ from importlib.resources import files
 from typing import NamedTuple
 
 from . import captions, summary_html
-from .charts import comparison, health, signals, stability, tracking, transfer
+from .charts import health, signals, stability, tracking, transfer
 from .document import document
 from .figure import Figure, Spec
 from .run import Run
@@ -135,7 +135,7 @@ def _comparison(page: Page, run: Run) -> None:
         "Against the estimates in the log",
         page.figure(
             "figure-comparison",
-            comparison.recorded(run),
+            tracking.recorded(run),
             "The log holds estimates already, of the firmware that ran when it was recorded: wide line. Thin line: the "
             "same samples through this firmware, with the settings below. Where only one is seen, they are equal.",
         ),

@@ -129,7 +129,7 @@ class Run:
 
     # What takes every sample to tell; a run that has kept fewer overrides these.
 
-    @property
+    @cached_property
     def samples(self) -> int:
         """How many there were."""
         return len(self.time)
@@ -191,7 +191,7 @@ class Run:
 
     # ---
 
-    @property
+    @cached_property
     def end(self) -> float:
         """Time of the last sample [s]."""
         return float(self.time[-1])

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..numeric.arrays import Array
+from ..numeric.windows import Windows, hann, transform
 
 
 def packed(values: Array) -> dict[str, object]:
@@ -69,49 +70,25 @@ def jumps(time: Array, columns: list[Array], relative: float = 0.02, apart: floa
 
 
 class Welch:
-    """One-sided power spectral density [unit²/Hz] of samples as they come: the mean over half-overlapping Hann windows.
-
-    P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967). As scipy.signal.welch, whose import alone would take longer
-    than the rest of the report. Gaps (NaN) count as the mean of their window.
-    """
+    """One-sided power spectral density [unit²/Hz] of samples as they come: the mean over windows."""
 
     def __init__(self, sample_period: float, seconds: float = 4.0) -> None:
         self._period = sample_period
-        self._length = max(1, round(seconds / sample_period))
-        self._rest = np.zeros(0)
-        self._power = np.zeros(self._length // 2 + 1)
-        self._windows = 0
+        self._windows = Windows(1, max(1, round(seconds / sample_period)))
+        self._power = np.zeros(self._windows.length // 2 + 1)
 
     def add(self, values: Array) -> None:
         """Further samples."""
-        joined, hop = np.concatenate((self._rest, values)), max(1, self._length // 2)
-        if len(joined) < self._length:
-            self._rest = joined
-            return
-        windows = np.lib.stride_tricks.sliding_window_view(joined, self._length)[::hop]
-        self._power = self._power + self._density(windows).sum(axis=0)
-        self._windows += len(windows)
-        self._rest = joined[len(windows) * hop :].copy()
+        self._power += (np.abs(self._windows.add(values)[0]) ** 2).sum(axis=0)
 
     def spectrum(self) -> tuple[Array, Array]:
         """Return frequencies [Hz] and density; of what there is, if that is shorter than a window."""
-        if self._windows:
-            length, power = self._length, self._power / self._windows
-        else:
-            length, power = len(self._rest), self._density(self._rest[np.newaxis])[0]
-        return np.fft.rfftfreq(length, self._period).astype(np.float64), power
-
-    def _density(self, windows: Array) -> Array:
-        length = windows.shape[1]
-        finite = np.isfinite(windows)
-        mean = np.where(finite, windows, 0.0).sum(axis=1, keepdims=True) / np.maximum(
-            finite.sum(axis=1, keepdims=True), 1
-        )
-        detrended = np.where(finite, windows - mean, 0.0)
-        shape = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
-        power: Array = np.abs(np.fft.rfft(detrended * shape, axis=1)) ** 2 * (self._period / float(shape @ shape))
-        power[:, 1 : (length + 1) // 2] *= 2.0
-        return power
+        length, power = self._windows.length, self._power / max(self._windows.count, 1)
+        if not self._windows.count:
+            length, power = self._windows.rest.shape[1], np.abs(transform(self._windows.rest)[0]) ** 2
+        density = power * (self._period / float(np.sum(hann(length) ** 2)))
+        density[1 : (length + 1) // 2] *= 2.0
+        return np.fft.rfftfreq(length, self._period).astype(np.float64), density
 
 
 def welch(values: Array, sample_period: float, seconds: float = 4.0) -> tuple[Array, Array]:

@@ -91,7 +91,7 @@ def _mood(run: Run) -> str:
     if run.simulated is None:
         if run.summary is not None and not run.summary.passed:
             return "bad"
-        warned = (run.replayed.flagged_share if run.replayed else None) or 0.0
+        warned = (run.summary.flagged_share if run.summary else None) or 0.0
         return "bad" if warned >= trust.MOST else "watch" if warned > LITTLE else ""
     if not run.simulated.passed or (run.simulated.flagged_share or 0.0) >= trust.MOST:
         return "bad"
@@ -275,8 +275,8 @@ def run_table(run: Run) -> str:
     ]
     rows += [(label, number(getattr(run.summary, key, None)), unit) for key, label, unit in RUN_FIGURES]
     shares: dict[str, float | None] = {}
-    if judged := run.simulated or run.replayed:
-        shares = {**judged.fault_shares, "any that warns": judged.flagged_share}
+    if run.summary:
+        shares = {**run.summary.fault_shares, "any that warns": run.summary.flagged_share}
     rows += [
         (f"of the judged time with fault: {html.escape(name)}", number(None if share is None else 100.0 * share), "%")
         for name, share in shares.items()

@@ -72,6 +72,10 @@ class Summary:
     whiteness: Whiteness | None
     modes_s: dict[str, float]
     """Seconds in each mode."""
+    fault_shares: dict[str, float]
+    """Shares (0 to 1) of the judged time with each fault that there was; without those of inputs that a log lacks."""
+    flagged_share: float | None
+    """Of the judged time with any of DO_NOT_TRUST of those; None where nothing is judged."""
     passed: bool
     verdict: str
     """In a few sentences."""
@@ -156,10 +160,6 @@ class SimulationSummary(Summary):
     """By quantity, as far as there is a truth."""
     unanswered: int
     misplaced: int
-    fault_shares: dict[str, float]
-    """Shares (0 to 1) of the judged time with each fault that there was."""
-    flagged_share: float | None
-    """The same with any that tells the user not to trust the estimates."""
     missed: list[str]
     """Limits, in words."""
     simulated_time_s: float
@@ -323,10 +323,6 @@ class ReplaySummary(Summary):
     """Of `lever replay`."""
 
     recording: RecordingSummary
-    fault_shares: dict[str, float]
-    """Shares (0 to 1) of the judged time with each fault that there was; without those of inputs that the log lacks."""
-    flagged_share: float | None
-    """Of the judged time with any of DO_NOT_TRUST of those; None where nothing is judged."""
     estimates: dict[str, Estimate]
     comparison: Comparison | None
     snapshots: Snapshots | None = None

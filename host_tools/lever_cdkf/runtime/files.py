@@ -129,6 +129,30 @@ def check_not_input(path: str | os.PathLike[str] | None, inputs: Iterable[str | 
             raise LeverError(f"cannot write {path}: it is an input: choose another folder or name")
 
 
+class Growing:
+    """A file that is written a piece at a time; complete after close()."""
+
+    def __init__(self, path: Path) -> None:
+        """Begin it. Raise LeverError."""
+        self._path = path
+        with writing(path):
+            self._file = path.open("wb")
+
+    def close(self) -> None:
+        """Complete it. Raise LeverError."""
+        with writing(self._path):
+            self._finish()
+            self._file.close()
+
+    def abandon(self) -> None:
+        """Let go of it."""
+        with suppress(OSError):
+            self._file.close()
+
+    def _finish(self) -> None:
+        """Write what stands at its end."""
+
+
 class Outputs:
     """The files of a command in a folder, put into place together when all are whole.
 
