@@ -111,11 +111,12 @@ def run(args: argparse.Namespace) -> int:
         recording = read(args.log, args.channel, args.start, args.length, progress.show, reading)
         before = _as_recorded(before, recording)
         likelihood = Likelihood(recording, args.held_out)
-        calibration = calibrate(likelihood, before, args.keep, progress.show)
+        likelihood.progress = progress.show
+        calibration = calibrate(likelihood, before, args.keep)
         tuned: list[Tuned] = []
         if not calibration.is_refused:
             calibrated = {**before, **calibration.assignments}
-            search = Search(likelihood, calibrated, progress.show)
+            search = Search(likelihood, calibrated)
             if not search.can_learn:
                 _note("hardly any motion to learn from (excitation_least): only noise is looked for, and that at rest")
             tuned = search.run(groups(calibrated, args.keep))

@@ -27,7 +27,7 @@ from ..firmware.settings_file import Assignments, make_config
 from ..numeric.arrays import Array
 from ..results import whiteness
 from .likelihood import LEARNT_LEAST, Likelihood, noise_as_set
-from .search import NOISE, ShowProgress
+from .search import NOISE, logarithmic_range
 
 NAMES = ("z_ddot_gain", "z_ddot_delay", "lever_friction")
 TORQUE_GAIN = "tau_m_gain"
@@ -39,7 +39,6 @@ _STEPS = {"z_ddot_gain": 2.5e-3, "z_ddot_delay": 1e-4, "lever_friction": 5e-3, T
 _NOISE_STEP = 0.02  # of the logarithm
 """Of the differences that make the scores [unit of the setting]: about half a standard deviation of a minute's log."""
 _FARTHEST = 1.0  # that the logarithm of a noise goes in one step
-_RANGE = 1000.0  # greatest factor by which a noise is changed
 _ROUNDS = 12
 _AGAIN = 2  # times that it is looked for in other parts of the log
 _CONVERGED = 0.05  # standard deviations
@@ -111,26 +110,22 @@ class Calibration:
         return {name: value for entry in self.entries for name, value in entry.assignments.items()}
 
 
-def calibrate(
-    likelihood: Likelihood, assignments: Assignments, kept: Sequence[str] = (), progress: ShowProgress | None = None
-) -> Calibration:
+def calibrate(likelihood: Likelihood, assignments: Assignments, kept: Sequence[str] = ()) -> Calibration:
     """Look for all of NAMES that are not `kept`, in the parts of the log in which the arm does not change.
 
     With a wrong calibration other changes are found than with the right one: it is looked for until they stay the same.
     """
     likelihood.leave_out_changes(assignments)
-    found = _calibrate(likelihood, assignments, kept, progress)
+    found = _calibrate(likelihood, assignments, kept)
     for _ in range(_AGAIN):
         best = {entry.name: entry.best for entry in found.entries}
         if not best or not likelihood.leave_out_changes({**assignments, **best}):
             break
-        found = _calibrate(likelihood, assignments, kept, progress)
+        found = _calibrate(likelihood, assignments, kept)
     return found
 
 
-def _calibrate(
-    likelihood: Likelihood, assignments: Assignments, kept: Sequence[str], progress: ShowProgress | None
-) -> Calibration:
+def _calibrate(likelihood: Likelihood, assignments: Assignments, kept: Sequence[str]) -> Calibration:
     config = make_config(assignments)
     names = tuple(name for name in NAMES if name not in kept)
     if not names:
@@ -139,7 +134,7 @@ def _calibrate(
     if missing:
         stay = "Gain and delay of the accelerometer (z_ddot_gain, z_ddot_delay) and lever_friction stay as they are: "
         return Calibration((), stay + missing)
-    entries = _Fit(likelihood, assignments, names, tuple(name for name in NOISE if name not in kept), progress).run()
+    entries = _Fit(likelihood, assignments, names, tuple(name for name in NOISE if name not in kept)).run()
     return Calibration(entries, _sentences(entries, config.settings[f"{TORQUE_GAIN}_sigma"]))
 
 
@@ -205,9 +200,7 @@ class _Unknown:
     @property
     def ends(self) -> tuple[float, float]:
         row = setting(self.name)
-        if self.logarithmic:
-            return math.log(max(row.least, self.before / _RANGE)), math.log(min(row.greatest, self.before * _RANGE))
-        return row.least, row.greatest
+        return logarithmic_range(self.name, self.before) if self.logarithmic else (row.least, row.greatest)
 
     def number(self, value: float) -> float:
         return math.log(value) if self.logarithmic else value
@@ -225,15 +218,14 @@ class _Fit:
         assignments: Assignments,
         names: Sequence[str],
         noise: Sequence[str],
-        progress: ShowProgress | None,
     ) -> None:
-        self._likelihood, self._progress, self._names = likelihood, progress, names
+        self._likelihood, self._names = likelihood, names
         self._base = noise_as_set(assignments)
         self._settings = make_config(assignments).settings
         tuned_noise = [name for name in noise if self._settings[name] > 0.0]
         self._unknowns = [_Unknown(name, name in tuned_noise, self._settings[name]) for name in (*names, *tuned_noise)]
         self._least, self._greatest = np.array([each.ends for each in self._unknowns]).T
-        self._expected = likelihood.runs + _ROUNDS // 2 * (2 * len(self._unknowns) + 1)
+        likelihood.expect("looking for the calibration", _ROUNDS // 2 * (2 * len(self._unknowns) + 1))
 
     def run(self) -> tuple[Calibrated, ...]:
         at = np.array([each.number(each.before) for each in self._unknowns])
@@ -269,9 +261,6 @@ class _Fit:
         delay = values.pop("z_ddot_delay", self._settings["z_ddot_delay"])
         everything = {**self._base, **values, **others, "z_ddot_delay": 0.0}
         innovations: Array = self._likelihood.run(everything, delay)
-        if self._progress is not None:
-            done = self._likelihood.runs
-            self._progress(min(done, self._expected - 1), self._expected, "looking for the calibration")
         return innovations if everywhere else innovations[self._likelihood.tuned_on]
 
     def _scores(self, at: Array, now: Array) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ arm changes are not tuned on: no noise, walk or calibration explains them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -29,6 +29,10 @@ LEARNT_LEAST = 5.0
 """Of the part that is tuned on, the parameters must have learnt for so long [s], for their walk to be looked for."""
 
 
+ShowProgress = Callable[[int, int, str], None]
+"""Runs done, runs expected, what is being done."""
+
+
 @dataclass
 class Likelihood:
     """Of a recording. `held_out` is the share at its end that is only judged by."""
@@ -37,6 +41,8 @@ class Likelihood:
     held_out: float = 0.3
     runs: int = field(default=0, init=False)
     """How often the estimator has run through the recording."""
+    progress: ShowProgress | None = field(default=None, init=False)
+    """Is told of each run, once expect() has said what it is for."""
     changes: list[tuple[float, float]] = field(default_factory=list, init=False)
     """From when to when the estimator has reported a change of the arm [s of the recording]."""
 
@@ -52,6 +58,7 @@ class Likelihood:
         self._wanted: Array = self.tuned_on
         self.judged_by: Array = time >= split
         """True at those that are held out."""
+        self._doing, self._expected = "", 1
 
     def leave_out_changes(self, assignments: Assignments) -> bool:
         """Tune on those parts only in which the estimator, with these settings, finds no change of the arm.
@@ -86,7 +93,15 @@ class Likelihood:
         A `delay` of the base acceleration [s] is undone before.
         """
         self.runs += 1
-        return innovations(make_config(assignments), self.recording.without_delay(delay))
+        result = innovations(make_config(assignments), self.recording.without_delay(delay))
+        if self.progress is not None and self._doing:
+            self.progress(min(self.runs, self._expected - 1), self._expected, self._doing)
+        return result
+
+    def expect(self, doing: str, runs: int | None = None) -> None:
+        """Say what the next runs are for, and with `runs` how many more there are, about."""
+        self._doing = doing
+        self._expected = self._expected if runs is None else self.runs + runs
 
     def of(self, assignments: Assignments) -> float:
         """Return logarithm of the likelihood of the part that is tuned on; -inf where the filter breaks down."""

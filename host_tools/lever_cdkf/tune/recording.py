@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..can import codec, logs
-from ..can.estimator_frames import EstimatorFrames, why_refused
+from ..can.estimator_frames import INPUTS, EstimatorFrames, why_refused
 from ..errors import LeverError
 from ..firmware.config import Config, setting
 from ..firmware.estimator import Health
@@ -17,8 +17,6 @@ from ..firmware.innovations import FRAME, samples_of
 from ..numeric.arrays import Array
 from ..signals.mapped_frames import MappedFrames
 from ..signals.reading import Reading
-
-_SAMPLES = ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")
 
 
 @dataclass(frozen=True)
@@ -69,31 +67,22 @@ def read(
     They are those from `start` on for `length`, both [s] of recorded time; with `reading`, of a log that does not speak
     lever.dbc.
     """
-    if reading is not None:
-        mapped = MappedFrames(list(map(str, paths)), reading)
-        return _recording(np.concatenate(list(mapped.chunks())), str(mapped.channel), ", ".join(mapped.recording.paths))
-    traffic = EstimatorFrames(logs.Recording(paths), channel)
-    log = traffic.recording
-    identifiers = np.array([codec.message(name).frame_id for name in _SAMPLES])
-    command = codec.message("COMMAND").frame_id
+    traffic: EstimatorFrames | MappedFrames
+    if reading is None:
+        traffic = EstimatorFrames(logs.Recording(paths), channel, start, length)
+    else:
+        traffic = MappedFrames(list(map(str, paths)), reading)
+    log, inputs = traffic.recording, [codec.message(name).frame_id for name in INPUTS]
     pieces = []
     for chunk in traffic.chunks():
-        since = (chunk["time_us"] - traffic.first_us) * 1e-6
-        sampled = np.isin(chunk["id"], identifiers) & (since >= start)
-        pieces.append(chunk[(sampled | (chunk["id"] == command)) & (since < start + length)])
+        pieces.append(chunk[np.isin(chunk["id"], inputs)])
         if progress is not None:
             progress(log.done, log.size, "reading the log")
-        if len(since) and since[-1] > start + length:
-            break
     name = ", ".join(log.paths)
     if channel is None and traffic.other_samples:
         buses = " or --channel ".join(sorted({str(traffic.channel), *traffic.other_samples}))
         raise LeverError(f"{name}: samples on more than one bus: choose by --channel {buses}")
-    frames = np.concatenate(pieces)
-    base = codec.message("BASE_SAMPLE").frame_id
-    if not (frames["id"] == base).any():
-        raise LeverError(f"{name}: no BASE_SAMPLE ({base:#x}) from {start:g} s on, so no samples")
-    return _recording(frames, str(traffic.channel), name)
+    return _recording(np.concatenate(pieces), str(traffic.channel), name)
 
 
 def _recording(frames: Array, bus: str, log: str) -> Recording:

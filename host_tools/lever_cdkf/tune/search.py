@@ -12,7 +12,7 @@ outside the 95 % likelihood interval (Wilks 1938; with the other settings as fou
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,9 +36,6 @@ _TOLERANCE = 0.1  # of the logarithm of the likelihood; a tenth of a per cent of
 _OFFSET = 1e3  # makes the optimiser's relative tolerance that
 _DROP = 0.5 * chi_square_quantile(0.95, 1)  # of the logarithm of the likelihood at the ends of a 95 % interval
 _RUNS_A_SETTING = 80  # about; only for the progress that is shown
-
-ShowProgress = Callable[[int, int, str], None]
-"""Runs done, runs expected, what is being done."""
 
 
 @dataclass(frozen=True)
@@ -103,14 +100,11 @@ def change_walk(assignments: Assignments, tuned: Sequence[Tuned]) -> dict[str, f
 class Search:
     """Looks for the settings under which the log is most likely."""
 
-    def __init__(self, likelihood: Likelihood, assignments: Assignments, progress: ShowProgress | None = None) -> None:
+    def __init__(self, likelihood: Likelihood, assignments: Assignments) -> None:
         self._likelihood = likelihood
         self._base = noise_as_set(assignments)
         self._settings = make_config(assignments).settings
         self._learnt = likelihood.learnt(self._base)
-        self._progress = progress
-        self._expected = 1
-        self._doing = ""
 
     @property
     def can_learn(self) -> bool:
@@ -122,26 +116,22 @@ class Search:
         if not self.can_learn:
             wanted = {group: names for group, names in wanted.items() if group == "noise"}
         names = [name for group in wanted.values() for name in group]
-        self._expected = self._likelihood.runs + _RUNS_A_SETTING * (len(names) + len(wanted.get("noise", ())))
+        runs = _RUNS_A_SETTING * (len(names) + len(wanted.get("noise", ())))
         best = {name: math.log(self._settings[name]) for name in names}
+        self._likelihood.expect("", runs)
         for group in (*wanted, *(("noise",) if len(wanted) > 1 and "noise" in wanted else ())):
-            self._doing = f"looking for {group}"
+            self._likelihood.expect(f"looking for {group}")
             best |= self._maximum(best, wanted[group])
-        self._doing = "how sure that is"
+        self._likelihood.expect("how sure that is")
         top = self._at(best)
         return [self._tuned(name, best, top) for name in names]
 
     def _at(self, logarithms: dict[str, float]) -> float:
         values = {name: _bounded(name, math.exp(value)) for name, value in logarithms.items()}
-        result = self._likelihood.of({**self._base, **values})
-        if self._progress is not None:
-            done = self._likelihood.runs
-            self._progress(min(done, self._expected - 1), self._expected, self._doing)
-        return result
+        return self._likelihood.of({**self._base, **values})
 
     def _limits(self, name: str) -> tuple[float, float]:
-        row, now = setting(name), self._settings[name]
-        return math.log(max(row.least, now / _RANGE)), math.log(min(row.greatest, now * _RANGE))
+        return logarithmic_range(name, self._settings[name])
 
     def _maximum(self, start: dict[str, float], names: Sequence[str]) -> dict[str, float]:
         """Return the most likely logarithms of `names`, the others as in `start`."""
@@ -184,6 +174,12 @@ class Search:
                 return None
             inner, step = outer, 2.0 * step
         return None
+
+
+def logarithmic_range(name: str, now: float) -> tuple[float, float]:
+    """Return least and greatest logarithm of a setting that is `now`."""
+    row = setting(name)
+    return math.log(max(row.least, now / _RANGE)), math.log(min(row.greatest, now * _RANGE))
 
 
 def _bounded(name: str, value: float) -> float:

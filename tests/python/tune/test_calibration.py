@@ -32,7 +32,9 @@ def wrong(simulate: Simulate) -> Recording:
 def test_it_is_found_wherever_the_search_starts(wrong: Recording, start: dict[str, float]) -> None:
     """Noise that is set wrong, by a factor of two both ways, must not look like a gain."""
     steps: list[tuple[int, int, str]] = []
-    found = calibrate(Likelihood(wrong, held_out=0.0), start, progress=lambda *step: steps.append(step)).entries
+    likelihood = Likelihood(wrong, held_out=0.0)
+    likelihood.progress = lambda *step: steps.append(step)
+    found = calibrate(likelihood, start).entries
     assert [step[0] for step in steps] == sorted(step[0] for step in steps)
     assert all(0 < done < total for done, total, _ in steps)
     assert [entry.name for entry in found] == list(NAMES)

@@ -89,7 +89,9 @@ def test_at_rest_only_noise_is_looked_for(simulate: Simulate) -> None:
     recorded = recording.read([at_rest], progress=lambda *step: steps.append(step))
     assert steps[-1] == (at_rest.stat().st_size, at_rest.stat().st_size, "reading the log")
     steps.clear()
-    search = Search(Likelihood(recorded), {}, lambda *step: steps.append(step))
+    likelihood = Likelihood(recorded)
+    likelihood.progress = lambda *step: steps.append(step)
+    search = Search(likelihood, {})
     assert not search.can_learn
     assert [entry.name for entry in search.run(groups({}, list(NOISE)[1:]))] == ["theta_noise"]
     done = [step[0] for step in steps]
