@@ -175,20 +175,7 @@ def _tables(summary: ReplaySummary) -> Tables:
     ]
     tables: dict[str, list[Row]] = {"estimates": estimates}
     if summary.comparison is not None:
-        tables["replayed minus recorded estimates"] = [
-            {
-                "signal": name,
-                "unit": entry.unit,
-                "samples": entry.samples,
-                "identical": entry.identical_samples,
-                "mean difference": entry.bias,
-                "rms difference": entry.rms,
-                "largest difference": entry.largest,
-                "at [s]": entry.largest_at_s,
-                "rms in sigma [1]": entry.rms_in_sigma,
-            }
-            for name, entry in summary.comparison.signals.items()
-        ]
+        tables["replayed minus recorded estimates"] = [*summary.comparison.rows()]
     if mapping := summary.recording.mapping:
         tables["signals"] = [{"input": key, **vars(each)} for key, each in mapping.inputs.items()]
     shares = {**summary.fault_shares, "any that warns": summary.flagged_share}

@@ -8,7 +8,10 @@ from ..models.detrend import Detrend
 from ..models.lever import Lever
 from ..models.transfer import Transfer
 from ..numeric.arrays import Array, ComplexArray
+from ..results.feedthrough import FREQUENCIES as SENT
 
+SIGMAS = 2.0
+"""A band reaches so many standard deviations to either side."""
 LONGEST_STEP = 0.05  # [s] that the trim moves on by after a gap
 FREQUENCIES: Array = np.linspace(0.5, 12.0, 116)  # [Hz]
 
@@ -74,6 +77,18 @@ def magnitude_and_phase(response: ComplexArray) -> tuple[Array, Array]:
     start = -180.0 if response[0].real < 0.0 else 0.0
     along = response if start == 0.0 else -response
     return np.abs(response), np.degrees(np.unwrap(np.angle(along))) + start
+
+
+def bands(
+    frequency: Array, magnitude: Array, phase: Array, gain_sigma: Array, phase_sigma: Array
+) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Return low and high edge of a magnitude and of its phase [deg], by the standard deviations that are sent.
+
+    Those are between the frequencies of FEEDTHROUGH by straight lines; beyond them the edges are NaN.
+    """
+    gain, angle = (np.interp(frequency, SENT, sigma, left=np.nan, right=np.nan) for sigma in (gain_sigma, phase_sigma))
+    factor, half = np.exp(SIGMAS * gain), SIGMAS * np.degrees(angle)
+    return (magnitude / factor, magnitude * factor), (phase - half, phase + half)
 
 
 def slow_trim(time: Array, theta: Array, corner: float) -> Array:

@@ -201,13 +201,7 @@ def _times(values: Sequence[float | None] | None) -> str:
 def comparison_table(run: Run) -> str:
     """Replayed minus recorded, signal by signal."""
     compared = run.replayed.comparison if run.replayed else None
-    header = ("", "unit", "samples", "identical", "mean", "rms", "largest", "at [s]", "rms ÷ σ")
-    keys = ("unit", "samples", "identical_samples", "bias", "rms", "largest", "largest_at_s", "rms_in_sigma")
-    if compared is None:
-        return ""
-    return table(
-        header, [(name, *(number(getattr(each, key)) for key in keys)) for name, each in compared.signals.items()]
-    )
+    return rows_table(compared.rows(), 3) if compared else ""
 
 
 def recorded(run: Run) -> str:

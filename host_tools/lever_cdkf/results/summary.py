@@ -214,6 +214,23 @@ class Comparison:
     signals: dict[str, Difference]
     in_words: str
 
+    def rows(self) -> list[dict[str, str | float | None]]:
+        """Return what tables show of each signal."""
+        return [
+            {
+                "signal": name,
+                "unit": each.unit,
+                "samples": each.samples,
+                "identical": each.identical_samples,
+                "mean difference": each.bias,
+                "rms difference": each.rms,
+                "largest difference": each.largest,
+                "at [s]": each.largest_at_s,
+                "rms in sigma [1]": each.rms_in_sigma,
+            }
+            for name, each in self.signals.items()
+        ]
+
 
 @dataclass
 class MessageCounts:

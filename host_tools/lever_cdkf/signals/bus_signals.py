@@ -7,7 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import cantools.database
 import numpy as np
@@ -25,6 +25,7 @@ from ..results.summary import MessageCounts
 from ..text.suggestions import nearest_names
 from .mapping import Protection
 from .recorded import Signal
+from .text_table import UTF_8, encoding_of
 
 _NO_VALUE = re.compile(r"sna$|not.?avail|invalid|error|fault|undefined|no.?value", re.IGNORECASE)
 """Names of codes that stand for no value."""
@@ -54,13 +55,7 @@ def _encoding(path: Path) -> str | None:
 
     It is UTF-8 where the file is that, else what cantools takes for its format.
     """
-    if path.suffix.lower() != ".dbc":
-        return None
-    try:
-        path.read_bytes().decode("utf-8")
-    except UnicodeDecodeError:
-        return None
-    return "utf-8"
+    return "utf-8" if path.suffix.lower() == ".dbc" and encoding_of(str(path)) == UTF_8 else None
 
 
 def find(database: Database, name: str, where: str) -> tuple[Message, Field]:
@@ -90,20 +85,15 @@ def _near(name: str, names: Iterable[str]) -> str:
     return f"; near to it: {', '.join(near)}" if near else ""
 
 
+_Content = TypeVar("_Content")
+
+
 @dataclass
-class Received:
-    """Frames of one message on one bus."""
+class Timed(Generic[_Content]):
+    """Frames of one message on one bus (their data), or values of one signal of those that are right."""
 
     time_us: list[int] = field(default_factory=list)
-    data: list[bytes] = field(default_factory=list)
-
-
-@dataclass
-class Decoded:
-    """One signal of the frames that are right."""
-
-    time: list[float] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
+    content: list[_Content] = field(default_factory=list)
 
 
 class BusSignals:
@@ -123,8 +113,8 @@ class BusSignals:
             self._messages[message.frame_id, message.is_extended_frame] = message
             self._fields[message.name][signal.name] = signal
         self._protected = protected
-        self._frames: dict[tuple[str, str], Received] = defaultdict(Received)  # by message and bus
-        self._decoded: dict[tuple[str, str], dict[str, Decoded]] = {}
+        self._frames: dict[tuple[str, str], Timed[bytes]] = defaultdict(Timed)  # by message and bus
+        self._decoded: dict[tuple[str, str], dict[str, Timed[float]]] = {}
         for name, protection in protected.items():
             if protection.counter is not None:
                 find(database, f"{name}.{protection.counter}", f"[protected.{name}]")
@@ -146,7 +136,7 @@ class BusSignals:
                 received = self._frames[message.name, names[bus]]
                 received.time_us += kept["time_us"].tolist()
                 raw = np.ascontiguousarray(kept["data"]).tobytes()
-                received.data += [raw[8 * k : 8 * k + length] for k, length in enumerate(kept["length"].tolist())]
+                received.content += [raw[8 * k : 8 * k + length] for k, length in enumerate(kept["length"].tolist())]
 
     def add_fd(self, path: str, first_us: int, last_us: int) -> None:
         """Keep what is needed of the frames of CAN FD in a log, from one time to another. Raise LeverError."""
@@ -161,7 +151,7 @@ class BusSignals:
                         bus = "can" if frame.channel is None else "_".join(str(frame.channel).split()) or "can"
                         received = self._frames[message.name, bus]
                         received.time_us.append(time_us)
-                        received.data.append(bytes(frame.data))
+                        received.content.append(bytes(frame.data))
         except Exception as error:  # each format has its own
             raise LeverError(f"{path}: its frames of CAN FD cannot be read: {error}") from None
 
@@ -171,7 +161,7 @@ class BusSignals:
         if (message.name, bus) not in self._decoded:
             self._decoded[message.name, bus] = self._decode(message, self._frames[message.name, bus])
         decoded, each = self._decoded[message.name, bus][name], self._fields[message.name][name]
-        time, values = np.array(decoded.time, np.float64), np.array(decoded.values, np.float64)
+        time, values = np.array([1e-6 * at for at in decoded.time_us]), np.array(decoded.content, np.float64)
         return Signal(f"{message.name}.{name}", time, values, each.unit or "", each.comment or ""), bus
 
     def buses(self, message: Message) -> list[str]:
@@ -190,14 +180,14 @@ class BusSignals:
             raise LogError(f"{log}: {what} is {missed}on {' and '.join(buses)}: choose with --channel or channel=")
         raise LogError(f"{log}: no frame of {what} in it")
 
-    def _decode(self, message: Message, received: Received) -> dict[str, Decoded]:
+    def _decode(self, message: Message, received: Timed[bytes]) -> dict[str, Timed[float]]:
         """Return the signals of each frame that is right; a multiplexed one is not in all of them."""
         counts = self.counts.setdefault(message.name, MessageCounts())
-        counts.frames += len(received.data)
+        counts.frames += len(received.content)
         protection = self._protected.get(message.name)
-        decoded = {name: Decoded() for name in self._fields[message.name]}
+        decoded: dict[str, Timed[float]] = {name: Timed() for name in self._fields[message.name]}
         counter = _Counter(message, protection, counts)
-        for time_us, data in zip(received.time_us, received.data, strict=True):
+        for time_us, data in zip(received.time_us, received.content, strict=True):
             if not _is_right(protection, data):
                 counts.corrupt += 1
                 continue
@@ -209,8 +199,8 @@ class BusSignals:
             if counter.is_new(values):
                 for name, each in self._fields[message.name].items():
                     if name in values:
-                        decoded[name].time.append(1e-6 * time_us)
-                        decoded[name].values.append(number(each, values[name]))
+                        decoded[name].time_us.append(time_us)
+                        decoded[name].content.append(number(each, values[name]))
         return decoded
 
 

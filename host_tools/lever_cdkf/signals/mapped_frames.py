@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -40,24 +39,13 @@ def frames_of(samples: Samples) -> Frames:
 _CONTENTS = ("theta", "theta_dot", "tau_m", "z_ddot", "grip_force")
 
 
-@dataclass
-class Origin:
-    """Of can.logs.Recording, what is asked of one that has been read."""
-
-    paths: list[str]
-    damaged: int
-    ends_early: list[str]
-    done: int = 1
-    size: int = 1
-
-
 class MappedFrames:
     """A can.estimator_frames.EstimatorFrames of logs that do not speak lever.dbc."""
 
     def __init__(self, logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None) -> None:
         """Read all of it. Raise LeverError."""
         self.loaded: Loaded = read(logs, reading, progress)
-        self.recording = Origin(self.loaded.paths, self.loaded.damaged, self.loaded.ends_early)
+        self.recording = self.loaded.recording
         self.channel: str | None = "_".join(self.loaded.buses)[:24] or BUS
         self.frames = self.loaded.frames
         self.others = {"other_identifiers": max(self.loaded.frames - self.loaded.used, 0) if self.loaded.buses else 0}

@@ -41,6 +41,17 @@ class Reading:
 
 
 @dataclass
+class Table:
+    """A file of columns as a Recording that has been read."""
+
+    paths: list[str]
+    damaged: int = 0
+    ends_early: list[str] = field(default_factory=list)
+    done: int = 1
+    size: int = 1
+
+
+@dataclass
 class Loaded:
     """The samples, and where they come from."""
 
@@ -48,7 +59,7 @@ class Loaded:
     inputs: dict[str, Input]
     notes: list[str]
     """What was guessed or is odd, a sentence each."""
-    paths: list[str]
+    recording: Recording | Table
     buses: list[str]
     frames: int
     """Of the part of the log, or rows of that of the file."""
@@ -58,8 +69,6 @@ class Loaded:
     """By mapped message."""
     unprotected: int = 0
     """Frames of mapped messages without E2E protection in the mapping."""
-    damaged: int = 0
-    ends_early: list[str] = field(default_factory=list)
 
     def summary(self) -> Mapped:
         """Return what summary.json says of it."""
@@ -111,8 +120,7 @@ def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, pro
     unprotected = sum(counts.frames for name, counts in reader.counts.items() if name not in mapping.protected)
     used = sum(counts.frames for counts in reader.counts.values())
     return Loaded(
-        *(samples, inputs, [*set_back, *notes], [str(path) for path in recording.paths], sorted(buses), frames, used),
-        *(reader.counts, unprotected, recording.damaged, recording.ends_early),
+        samples, inputs, [*set_back, *notes], recording, sorted(buses), frames, used, reader.counts, unprotected
     )
 
 
@@ -129,7 +137,7 @@ def _of_table(path: str, reading: Reading) -> Loaded:
     samples, notes = recorded_samples(inputs, reading.clock)
     of_file = notes_of(each.signal for each in inputs.values())
     rows = max(len(each.signal.time) for each in inputs.values())
-    return Loaded(samples, inputs, [*of_file, *notes], [path], [], rows, 0)
+    return Loaded(samples, inputs, [*of_file, *notes], Table([path]), [], rows, 0)
 
 
 def all_signals(

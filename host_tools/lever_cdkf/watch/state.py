@@ -19,7 +19,7 @@ from ..report import bode
 from . import paired, status
 from .picture import STEP, Picture
 from .sources import Source
-from .transfer import FREQUENCIES, SIGMAS, Geometry, Response
+from .transfer import FREQUENCIES, Geometry, Response
 
 SPAN = 60.0
 """[s] that the page shows."""
@@ -64,7 +64,7 @@ class State:
         self._rows.append(self._row({} if truth is None else truth[0]))
         update = self._present()
         update["row"] = self._rows[-1]
-        update["bode"] = None if response is None else _bode(response)
+        update["bode"] = None if response is None else response._asdict()
         update |= {"truth": None, "truth_phase": None} if truth is None else _truth(truth[1])
         update["coherence"] = self._coherence()
         if not self._map or picture.now - self._map[-1][0] >= 0.99 * MAP_STEP:
@@ -83,7 +83,7 @@ class State:
             "choices": {what: list(enum_names(f"lever_{what}").values()) for what in ("model", "estimator")},
             "dither_limit": self._dither_limit,
             "without_torque": self._model in WITHOUT_TORQUE,
-            "sigmas": SIGMAS,
+            "sigmas": bode.SIGMAS,
             "span": SPAN,
             "step": STEP,
             "map_step": MAP_STEP,
@@ -157,17 +157,6 @@ class State:
             "unseen": source.dropped,
             "run": source.run_number,
         }
-
-
-def _bode(response: Response) -> dict[str, FloatArray]:
-    return {
-        "magnitude": response.magnitude,
-        "low": response.magnitude / response.factor,
-        "high": response.magnitude * response.factor,
-        "phase": response.phase,
-        "phase_low": response.phase - response.phase_half_band,
-        "phase_high": response.phase + response.phase_half_band,
-    }
 
 
 def _truth(response: ComplexArray) -> dict[str, FloatArray]:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.estimator import Estimator
+from lever_cdkf.report.bode import SIGMAS
 from lever_cdkf.watch.picture import Feedthrough
-from lever_cdkf.watch.transfer import FREQUENCIES, SIGMAS, Geometry
+from lever_cdkf.watch.transfer import FREQUENCIES, Geometry
 
 DEGREES = 180.0 / math.pi
 SENT = [Feedthrough(f, complex(math.nan), 0.01 * f, 0.002 * f) for f in range(2, 9)]
@@ -82,10 +83,14 @@ def test_the_band_is_what_was_sent_and_none_beyond() -> None:
     response = Geometry(Config()).response("lever", (2.5, 42.0, 1500.0), 0.35, SENT)
     assert response is not None
     inside = (FREQUENCIES >= 2.0) & (FREQUENCIES <= 8.0)
-    np.testing.assert_allclose(np.log(response.factor[inside]), SIGMAS * 0.01 * FREQUENCIES[inside])
-    np.testing.assert_allclose(response.phase_half_band[inside], SIGMAS * DEGREES * 0.002 * FREQUENCIES[inside])
-    assert np.isnan(response.factor[~inside]).all()
-    assert np.isnan(response.phase_half_band[~inside]).all()
+    for edge, sign in ((response.low, -1.0), (response.high, 1.0)):
+        ratio = np.log(edge / response.magnitude)
+        np.testing.assert_allclose(ratio[inside], sign * SIGMAS * 0.01 * FREQUENCIES[inside])
+        assert np.isnan(ratio[~inside]).all()
+    for edge, sign in ((response.phase_low, -1.0), (response.phase_high, 1.0)):
+        beside = edge - response.phase
+        np.testing.assert_allclose(beside[inside], sign * SIGMAS * DEGREES * 0.002 * FREQUENCIES[inside])
+        assert np.isnan(beside[~inside]).all()
 
 
 @pytest.mark.parametrize(("stiffness", "trim"), [(math.nan, 0.35), (1500.0, math.nan)])

@@ -8,7 +8,7 @@ from ...firmware.quantities import DYNAMICS
 from ...numeric.arrays import Array
 from ...results.feedthrough import FREQUENCIES as SENT
 from .. import bode
-from ..bode import FREQUENCIES, magnitude_and_phase
+from ..bode import FREQUENCIES, SIGMAS, magnitude_and_phase
 from ..figure import TICKS, Figure, Spec, axis, axis_range, band, frequency_axis, line, time_axis
 from ..run import Run
 from ..series import coarse, packed, spread_indices
@@ -16,7 +16,6 @@ from ..series import coarse, packed, spread_indices
 TIMES = 200
 SLICES = 25
 ACCURACY_TIMES = 300
-SIGMAS = 2.0
 BAND: Array = FREQUENCIES[np.clip(FREQUENCIES, SENT[0], SENT[-1]) == FREQUENCIES]
 DEGREES = 180.0 / np.pi
 
@@ -118,7 +117,7 @@ def slices(run: Run) -> Figure | None:
 def _bands(run: Run, time: Array, estimate: np.ndarray) -> list[list[tuple[Array, Array]]]:
     """Return the low and high edge over BAND, of magnitude and of phase, at each time.
 
-    They are ±2σ of what was sent, between its frequencies by straight lines. Nothing where nothing was sent.
+    Nothing where nothing was sent.
     """
     sent = run.feedthrough.at(time)
     if not np.isfinite(sent["gain_sigma"] + sent["phase_sigma"]).all(axis=1).any():
@@ -127,10 +126,9 @@ def _bands(run: Run, time: Array, estimate: np.ndarray) -> list[list[tuple[Array
     magnitudes, phases = [], []
     for curve, gain_sigma, phase_sigma in zip(estimate, sent["gain_sigma"], sent["phase_sigma"], strict=True):
         magnitude, phase = (values[inside] for values in magnitude_and_phase(curve))
-        factor = np.exp(SIGMAS * np.interp(BAND, SENT, gain_sigma))
-        half = SIGMAS * DEGREES * np.interp(BAND, SENT, phase_sigma)
-        magnitudes.append((magnitude / factor, magnitude * factor))
-        phases.append((phase - half, phase + half))
+        of_magnitude, of_phase = bode.bands(BAND, magnitude, phase, gain_sigma, phase_sigma)
+        magnitudes.append(of_magnitude)
+        phases.append(of_phase)
     return [magnitudes, phases]
 
 
