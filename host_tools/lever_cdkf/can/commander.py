@@ -84,8 +84,7 @@ def result_of(ack: Mapping[str, float]) -> str:
         ACCEPTED, SEQUENCE or another result of lever.dbc.
     """
     number = int(ack["result"])
-    choices = codec.message("COMMAND_ACK").get_signal_by_name("result").choices
-    return str(choices[number]) if choices and number in choices else f"result {number}"
+    return codec.choices("COMMAND_ACK", "result").get(number, f"result {number}")
 
 
 def refusal(result: str) -> str:

@@ -206,30 +206,18 @@ class EstimatorFrames:
         )
 
 
-def sample_chunks(traffic: EstimatorFrames) -> Iterator[dict[str, NDArray[np.float64]]]:
-    """Yield the samples, as run_samples() takes them, a chunk at a time.
-
-    They are time_us (continued beyond 32 bits), theta [rad], theta_dot [rad/s], tau_m [N m], z_ddot [m/s^2], grip_force
-    [N]; NaN where a value is invalid or its LEVER_SAMPLE or GRIP_SAMPLE is missing.
-
-    Corrupt frames are left out, and samples with the time of the one before. Raise LogError.
-    """
-    pairing = Pairing()
-    for frames in traffic.chunks():
-        samples = pairing.add(frames)
-        if len(samples["time_us"]):
-            yield samples
-
-
 class Pairing:
-    """BASE_SAMPLE with the LEVER_SAMPLE and GRIP_SAMPLE of its counter, across chunks."""
+    """BASE_SAMPLE with the LEVER_SAMPLE and GRIP_SAMPLE of its counter, across chunks; time beyond 32 bits."""
 
     def __init__(self) -> None:
         self._rest: Frames | None = None
         self._time_us: int | None = None
 
     def add(self, frames: Frames) -> dict[str, NDArray[np.float64]]:
-        """Return the samples that further frames complete, as sample_chunks() yields them."""
+        """Return the samples that further frames complete, as run_samples() takes them.
+
+        Corrupt frames are left out, and samples with the time of the one before.
+        """
         identifiers = {name: codec.message(name).frame_id for name in ("LEVER_SAMPLE", "GRIP_SAMPLE", "BASE_SAMPLE")}
         parts = []
         for name, identifier in identifiers.items():
@@ -300,5 +288,6 @@ def read_samples(traffic: EstimatorFrames) -> dict[str, NDArray[np.float64]]:
     LogError
         The recording has no sample for the estimator, or cannot be read on.
     """
-    chunks = list(sample_chunks(traffic))
+    pairing = Pairing()
+    chunks = [pairing.add(frames) for frames in traffic.chunks()]
     return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]}

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import sys
 
 from ..errors import LeverError
-from ..runtime.extras import require_for_file, warn_of_no_report
+from ..runtime.extras import missing, require
 
 FORMATS = {"csv": "trace.csv", "mf4": "signals.mf4", "mcap": "signals.mcap", "parquet": "trace.parquet"}
 """And their files."""
+_EXTRAS = {"mf4": ("mf4",), "mcap": ("files", "mcap"), "parquet": ("files", "pyarrow")}
+"""What a format needs: an extra, and the package of it, if not all."""
 _DEFAULT = "csv"
 
 
@@ -31,10 +34,12 @@ def chosen_formats(args: argparse.Namespace) -> tuple[str, ...]:
         if args.format is not None:
             raise LeverError("--format is for the files of --out: say where these go")
         return ()
-    warn_of_no_report()
+    if reason := missing("report"):
+        print(f"lever: warning: no report.html: {reason}", file=sys.stderr)
     chosen: tuple[str, ...] = args.format or (_DEFAULT,)
     for name in chosen:
-        require_for_file(FORMATS[name])
+        if name in _EXTRAS:
+            require(*_EXTRAS[name])
     return chosen
 
 

@@ -79,7 +79,8 @@ def run(args: argparse.Namespace) -> int:
     others = [signal for signal in signals if signal.name not in inputs]
     changing = [signal for signal in others if signal.changes()]
     rows = [_row("", signal) for signal in changing]
-    print_tables({"mapping": [_proposed(each) for each in proposed], "other signals": rows}, args.json, inputs=read)
+    mapped: list[Row] = [{**_row(each.key, each.signal), "why": "; ".join(each.why)} for each in proposed]
+    print_tables({"mapping": mapped, "other signals": rows}, args.json, inputs=read)
     for note in [*notes_of(signals), *_assumed(mapping, proposed), *map(_left_out, nearly)]:
         layout.say(f"{note}.")
     if len(changing) < len(others):
@@ -123,10 +124,6 @@ def _signals(args: argparse.Namespace, start: float, length: float) -> list[Sign
     from ..signals.reading import all_signals
 
     return all_signals(args.log, args.dbc, args.channel, args.time, start, length)
-
-
-def _proposed(each: Candidate) -> Row:
-    return {**_row(each.key, each.signal), "why": "; ".join(each.why)}
 
 
 def _row(key: str, signal: Signal) -> Row:

@@ -11,9 +11,9 @@ from importlib.resources import files
 from pathlib import Path
 
 from ..errors import LeverError
-from ..runtime.files import check_writable, native_file, whole
+from ..runtime.files import check_writable, native_file, shared_library, whole
 from ..runtime.provenance import created, provenance
-from .binary import compile_library, compiler, headers, library_suffix, platform_tuple
+from .binary import compile_library, compiler, headers, platform_tuple
 from .description import Model, build_description, model_description
 
 _LICENCE = "MIT; the text is in the file LICENSE of Lever CDKF.\n"
@@ -87,7 +87,9 @@ def _fill(folder: Path, contents: Contents) -> None:
     (sources / "fmu_config.h").write_text(_config(model, contents.config), encoding="utf-8")
     (sources / "buildDescription.xml").write_bytes(build_description(model.identifier, compiled))
     (folder / "modelDescription.xml").write_bytes(model_description(model))
-    library = folder / "binaries" / platform_tuple() / f"{model.identifier}{library_suffix()}"
+    library = (
+        folder / "binaries" / platform_tuple() / f"{model.identifier}{Path(shared_library(model.identifier)).suffix}"
+    )
     compile_library(sources, compiled, library)
     _write_all(
         folder / "documentation", {"index.html": contents.page.encode(), "licenses/LICENSE.txt": _LICENCE.encode()}

@@ -28,11 +28,6 @@ def platform_tuple() -> str:
     return f"{_MACHINES.get(machine, machine)}-{system}"
 
 
-def library_suffix() -> str:
-    """Return the suffix of a shared library in an FMU."""
-    return {"darwin": ".dylib", "win32": ".dll"}.get(sys.platform, ".so")
-
-
 def headers() -> Path:
     """Return the folder with the headers of FMI 3.0, which FMPy brings. Raise LeverError without it."""
     require("fmu")

@@ -34,13 +34,11 @@ class Bounce:
             place = int(np.nanargmin(margin))
             least = tuple(float(trace[name][place]) for name in ("gain_margin_dB", "gain_margin_sigma_dB", "time_s"))
             self._least = min(self._least or least, least)  # type: ignore[assignment]
-        self._add_correction(trace["correction_rad"])
-        if "gain_margin_true_dB" in trace:
-            self._true = np.append(self._true, trace["gain_margin_true_dB"])
-
-    def _add_correction(self, correction: FloatArray) -> None:
+        correction = trace["correction_rad"]
         if np.isfinite(correction).any():
             self._correction = max(self._correction or 0.0, float(np.nanmax(np.abs(correction))))
+        if "gain_margin_true_dB" in trace:
+            self._true = np.append(self._true, trace["gain_margin_true_dB"])
 
     def summary(self, aircraft: AircraftResponse) -> Stability:
         """Return what it came to."""

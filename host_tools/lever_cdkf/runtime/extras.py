@@ -22,13 +22,6 @@ PACKAGES = {
 }
 """What each extra brings; imported by the same names."""
 
-_FILES = {
-    "signals.mf4": ("mf4",),
-    "signals.mcap": ("files", "mcap"),
-    "trace.parquet": ("files", "pyarrow"),
-}
-"""Files of signals that need an extra, and the packages of it that they need if not all."""
-
 
 def missing(extra: str, *packages: str) -> str:
     """Return which packages of an extra, or of these alone, are not installed, and how to get them.
@@ -51,18 +44,6 @@ def require(extra: str, *packages: str) -> None:
     """Raise LeverError where an extra, or these of its packages, are missing."""
     if reason := missing(extra, *packages):
         raise LeverError(reason)
-
-
-def require_for_file(name: str) -> None:
-    """Raise LeverError where a file of a run needs an extra that is missing."""
-    if name in _FILES:
-        require(*_FILES[name])
-
-
-def warn_of_no_report() -> None:
-    """Say on standard error that there will be no report.html, where its extra is missing."""
-    if reason := missing("report"):
-        print(f"lever: warning: no report.html: {reason}", file=sys.stderr)
 
 
 def hide_mf4(arguments: Sequence[str]) -> None:

@@ -11,7 +11,7 @@ from ..cli.tables import Row
 from ..report.figure import Figure, Spec, axis, band, dots, line
 from ..report.page import Page
 from ..report.summary_html import rows_table
-from ..results.whiteness import CANNOT_SEE
+from ..results.whiteness import CANNOT_SEE, averages
 from .search import Tuned
 from .validation import Fit
 
@@ -113,12 +113,9 @@ def _sizes(fits: Sequence[Fit]) -> Figure:
         count = len(fit.innovations) // size
         value, sigma = (fit.innovations[field][: count * size].astype(np.float64) for field in ("value", "sigma"))
         ratio = np.divide(value, sigma, out=np.full(value.shape, np.nan), where=sigma > 0.0)
-        finite = np.isfinite(ratio).reshape(count, size, -1)
-        squares = np.where(finite, np.square(np.nan_to_num(ratio)).reshape(count, size, -1), 0.0).sum(axis=1)
-        level = np.sqrt(squares / np.maximum(finite.sum(axis=1), 1))
         for row in range(len(_OUTPUTS)):
-            colour = _COLOURS[fit.settings]
-            figure.add(line((np.arange(count) + 0.5) * _WINDOW, level[:, row], fit.settings, colour, row))
+            level, colour = np.sqrt(averages(np.square(ratio[:, row]), size)), _COLOURS[fit.settings]
+            figure.add(line((np.arange(count) + 0.5) * _WINDOW, level, fit.settings, colour, row))
     return figure
 
 

@@ -15,8 +15,8 @@ from . import status
 from .paired import Measured
 from .picture import STEP, Estimated, Picture
 from .sources import Source
+from .status import NOTHING, number
 
-NOTHING = "–"
 _BLOCKS = " ▁▂▃▄▅▆▇█"
 _TREND_MEAN = 1.0  # [s] of the means that a trend is the difference of
 _COLOURS = {"good": "green", "watch": "yellow", "bad": "bold red"}
@@ -63,13 +63,13 @@ def estimates(picture: Picture, span: float, width: int, lines: int = 1) -> Tabl
     table.add_row(*(Text(title, style="dim") for title in titles))
     for entry in (*picture.parameters(), *picture.dynamics()):
         recent = _recent(picture, entry.key, span)
-        bottom, top = map(_number, _scale(recent, entry.sigma))
+        bottom, top = map(number, _scale(recent, entry.sigma))
         table.add_row(
             Text(entry.key, style="bold"),
-            Text(_number(entry.value), style="bold"),
-            f"± {_number(entry.sigma, 2)}",
+            Text(number(entry.value), style="bold"),
+            f"± {number(entry.sigma, 2)}",
             _UNIT.get(entry.unit, entry.unit),
-            _number(100.0 * entry.sigma / abs(entry.value) if entry.value else math.nan, 2),
+            number(100.0 * entry.sigma / abs(entry.value) if entry.value else math.nan, 2),
             _change(entry, recent),
             Text(sparkline(recent, entry.sigma, chart_width, lines), style="cyan"),
             *([Text(top + "\n" * (lines - 1) + bottom, style="dim")] if lines > 1 else []),
@@ -87,11 +87,11 @@ def feedthrough(picture: Picture, width: int) -> Table:
     entries = picture.feedthrough()
     measured = picture.coherence()
     rows: list[tuple[str, list[str]]] = [
-        ("gain [deg s²/m]", [_number(math.degrees(abs(entry.response)), 3) for entry in entries]),
-        ("± σ [%]", [_number(100.0 * entry.gain_sigma, 2) for entry in entries]),
-        ("phase [deg]", [_number(_lag(entry.response), 3) for entry in entries]),
-        ("± σ [deg]", [_number(math.degrees(entry.phase_sigma), 2) for entry in entries]),
-        ("coherence", [_number(_at(measured, entry.frequency), 2) for entry in entries]),
+        ("gain [deg s²/m]", [number(math.degrees(abs(entry.response)), 3) for entry in entries]),
+        ("± σ [%]", [number(100.0 * entry.gain_sigma, 2) for entry in entries]),
+        ("phase [deg]", [number(_lag(entry.response), 3) for entry in entries]),
+        ("± σ [deg]", [number(math.degrees(entry.phase_sigma), 2) for entry in entries]),
+        ("coherence", [number(_at(measured, entry.frequency), 2) for entry in entries]),
     ]
     rows.insert(0, ("", [f"{entry.frequency} Hz" for entry in entries]))
     if _FEEDTHROUGH_WIDTH + len(entries) * (_FREQUENCY_WIDTH + 1) > width:
@@ -152,40 +152,8 @@ def health(picture: Picture, source: Source) -> Table:
     """Mode, faults in words, counts, and how well it can learn."""
     table = Table.grid(padding=(0, 1), pad_edge=False)
     table.add_column(style="dim", no_wrap=True)
-    faults = status.faults(picture)
-    style = "yellow" if faults else "green"
-    counts = picture.counts
-    table.add_row("mode", Text(picture.mode or NOTHING, style="bold"))
-    chosen = [name for what, name in picture.identity.choices.items() if what != "model"]
-    table.add_row("choices", ", ".join(chosen) or NOTHING)
-    table.add_row("counts", f"{counts['lost']} lost, {counts['corrupt']} corrupt, {counts['late']} late")
-    table.add_row("excitation", f"{_number(picture.field('HEALTH', 'excitation'), 2)} rad/s")
-    asked = picture.identity.dither_rms
-    dither = f"{picture.dither():.3f} N m rms" if picture.dither() > 0.0 else "off"
-    table.add_row("dither", f"{dither}, asked {asked:g}" if asked else dither)
-    table.add_row("mean NIS", f"{_number(picture.nis())} (expected 2)")
-    if (near := status.bounce(picture)) is not None:
-        table.add_row("bounce", Text(near[1], style=_COLOURS[near[0]]))
-    table.add_row("theta", f"{_number(math.degrees(picture.theta()))} deg")
-    if picture.is_fresh("PLATFORM_HEALTH"):
-        errors = [round(picture.field("PLATFORM_HEALTH", name)) for name in ("transmit_errors", "receive_errors")]
-        table.add_row("TEC, REC", f"{errors[0]}, {errors[1]}; off bus {counts['bus_offs']}")
-        table.add_row("machine", f"{counts['overruns']} lost, {counts['dropped']} dropped")
-    if (reset := status.last_reset(picture)) is not None:
-        table.add_row("last reset", reset)
-    text = "; ".join(faults) or ("none" if picture.mode else NOTHING)
-    table.add_row("faults", Text(text, style=style if picture.mode else "dim"))
-    if (nearest := status.nearest_evidence(picture)) is not None:
-        table.add_row("evidence", nearest)
-    others = [
-        ("restarts", counts["restarts"]),
-        ("other frames", picture.foreign),
-        ("error frames", picture.error_frames),
-        ("unseen", source.dropped),
-    ]
-    for name, count in others:
-        if count:
-            table.add_row(name, str(count))
+    for name, text, level in status.facts(picture, source):
+        table.add_row(name, Text(text, style=_COLOURS.get(level, "")))
     return table
 
 
@@ -205,15 +173,6 @@ def messages(picture: Picture) -> Table:
         bad = entry.lost or entry.corrupt or entry.repeated
         table.add_row(entry.name, *cells, style="yellow" if bad else "" if there else "dim")
     return table
-
-
-def _number(value: float, digits: int = 4) -> str:
-    if not math.isfinite(value):
-        return NOTHING
-    if value == 0.0:
-        return "0"
-    decimals = min(5, max(0, digits - 1 - math.floor(math.log10(abs(value)))))
-    return f"{value:.{decimals}f}"
 
 
 def _recent(picture: Picture, key: str, span: float) -> list[float]:

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ..can.fields import COUNTS
 from ..firmware import quantities
 from ..firmware.config import Config, setting
 from ..firmware.library import enum_names
@@ -130,31 +129,16 @@ class State:
         """Return how it stands."""
         picture, source = self.picture, self._source
         level, text = status.of_source(picture, source)
-        machine = None
-        if picture.is_fresh("PLATFORM_HEALTH"):
-            names = ("transmit_errors", "receive_errors")
-            counts = ("bus_offs", "overruns", "dropped")
-            machine = {name: picture.field("PLATFORM_HEALTH", name) for name in names}
-            machine |= {name: picture.counts[name] for name in counts}
         return {
             "level": level,
             "condition": text,
             "mode": picture.mode,
-            "faults": status.faults(picture),
-            "bounce": status.bounce(picture),
             "silence": picture.silence(),
-            "counts": {name: picture.counts[name] for name in COUNTS},
-            "firmware": picture.identity.version,
-            "choices": picture.identity.choices,
-            "machine": machine,
-            "theta": math.degrees(picture.theta()),
+            "health": [*status.facts(picture, source), ("firmware", picture.identity.version or status.NOTHING, "")],
             "messages": [
                 [entry.name, entry.rate if entry.heard is not None else None, entry.lost, entry.corrupt, entry.repeated]
                 for entry in picture.traffic.values()
             ],
-            "foreign": picture.foreign,
-            "error_frames": picture.error_frames,
-            "unseen": source.dropped,
             "run": source.run_number,
         }
 

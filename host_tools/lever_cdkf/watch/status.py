@@ -13,6 +13,7 @@ from .sources import Source
 SELF_TESTS = {1: "program memory", 2: "RAM", 4: "stack", 8: "golden vector", 16: "settings or aircraft of its build"}
 """Bits of enum message_self_test (firmware/can/messages.h)."""
 
+NOTHING = "–"
 SILENT_AFTER = 1.0
 """[s] without a frame after which that is said."""
 
@@ -73,6 +74,58 @@ def nearest_evidence(picture: Picture) -> str | None:
     nearest = sorted((key for key in ratios if key < len(TEST_RATIOS)), key=lambda key: -ratios[key])[:3]
     texts = [f"{TEST_RATIOS[key].replace('_', ' ')} {ratios[key]:.2f}" for key in nearest]
     return f"{', '.join(texts)} (threshold 1)" if texts else None
+
+
+def facts(picture: Picture, source: Source) -> list[tuple[str, str, str]]:
+    """Return what there is to say of the estimator's health: name, text, and the level of condition() or nothing."""
+    counts, dither = picture.counts, "off"
+    if picture.dither() > 0.0:
+        dither = f"{picture.dither():.3f} N m rms"
+    if picture.identity.dither_rms:
+        dither += f", asked {picture.identity.dither_rms:g}"
+    present = faults(picture)
+    level = ("watch" if present else "good") if picture.mode else ""
+    rows = [
+        ("mode", picture.mode or NOTHING, ""),
+        (
+            "choices",
+            ", ".join(name for what, name in picture.identity.choices.items() if what != "model") or NOTHING,
+            "",
+        ),
+        ("counts", f"{counts['lost']} lost, {counts['corrupt']} corrupt, {counts['late']} late", ""),
+        ("excitation", f"{number(picture.field('HEALTH', 'excitation'), 2)} rad/s", ""),
+        ("dither", dither, ""),
+        ("mean NIS", f"{number(picture.nis())} (expected 2)", ""),
+    ]
+    if (near := bounce(picture)) is not None:
+        rows.append(("bounce", near[1], near[0]))
+    rows.append(("theta", f"{number(math.degrees(picture.theta()))} deg", ""))
+    if picture.is_fresh("PLATFORM_HEALTH"):
+        errors = [round(picture.field("PLATFORM_HEALTH", name)) for name in ("transmit_errors", "receive_errors")]
+        rows.append(("TEC, REC", f"{errors[0]}, {errors[1]}; off bus {counts['bus_offs']}", ""))
+        rows.append(("machine", f"{counts['overruns']} lost, {counts['dropped']} dropped", ""))
+    if (reset := last_reset(picture)) is not None:
+        rows.append(("last reset", reset, ""))
+    rows.append(("faults", "; ".join(present) or ("none" if picture.mode else NOTHING), level))
+    if (nearest := nearest_evidence(picture)) is not None:
+        rows.append(("evidence", nearest, ""))
+    others = {
+        "restarts": counts["restarts"],
+        "other frames": picture.foreign,
+        "error frames": picture.error_frames,
+        "unseen": source.dropped,
+    }
+    return rows + [(name, str(count), "") for name, count in others.items() if count]
+
+
+def number(value: float, digits: int = 4) -> str:
+    """Return a number with so many digits, without exponent; a dash for what is not known."""
+    if not math.isfinite(value):
+        return NOTHING
+    if value == 0.0:
+        return "0"
+    decimals = min(5, max(0, digits - 1 - math.floor(math.log10(abs(value)))))
+    return f"{value:.{decimals}f}"
 
 
 def last_reset(picture: Picture) -> str | None:

@@ -10,7 +10,7 @@ import math
 import pytest
 from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.library import ffi, lib
-from lever_cdkf.watch import panels
+from lever_cdkf.watch import panels, status
 from lever_cdkf.watch.picture import ERROR, Estimated, Picture
 from lever_cdkf.watch.sources import Source
 from python.conftest import Session
@@ -52,7 +52,7 @@ def rows(table: Table) -> dict[str, tuple[list[str], set[str]]]:
     ],
 )
 def test_numbers_have_as_many_digits_as_count(value: float, digits: int, shown: str) -> None:
-    assert panels._number(value, digits) == shown
+    assert status.number(value, digits) == shown
 
 
 @pytest.mark.parametrize(

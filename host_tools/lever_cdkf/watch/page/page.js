@@ -83,7 +83,7 @@ function goOn(update) {
   tellCondition(update.level, update.condition);
   tellStart(update);
   tellEstimates(update.row);
-  tellHealth(update);
+  tellHealth(update.health);
   tellMessages(update.messages);
   for (const [request, mode] of [["run", "run"], ["freeze", "frozen"]]) {
     document.querySelector(`[data-request=${request}]`).setAttribute("aria-pressed", update.mode === mode);
@@ -129,28 +129,10 @@ function tellEstimates(values) {
   });
 }
 
-function tellHealth(update) {
-  const { counts, machine, faults } = update;
-  const lines = [
-    ["mode", update.mode ?? "–"],
-    ["faults", faults.length ? faults.join("; ") : "none", faults.length > 0],
-    ["estimator counts", ["lost", "corrupt", "late", "restarts"].map((what) => `${counts[what]} ${what}`).join(", ")],
-    ["firmware", update.firmware ?? "–"],
-    ["choices", Object.values(update.choices).join(", ") || "–"],
-    ["lever angle", `${written(update.theta, 4)} deg`],
-  ];
-  if (update.bounce) lines.push(["collective bounce", update.bounce[1], update.bounce[0] !== "good"]);
-  if (machine) {
-    const errors = `TEC ${machine.transmit_errors}, REC ${machine.receive_errors}`;
-    lines.push(["bus controller", `${errors}, off the bus ${machine.bus_offs} times`]);
-    lines.push(["machine", `${machine.overruns} frames overrun, ${machine.dropped} dropped`]);
-  }
-  if (update.foreign) lines.push(["other frames", update.foreign]);
-  if (update.error_frames) lines.push(["error frames", update.error_frames, true]);
-  if (update.unseen) lines.push(["not seen here", `${update.unseen} frames`, true]);
-  document.querySelector("#health dl").replaceChildren(...lines.flatMap(([term, text, bad]) => [
+function tellHealth(facts) {
+  document.querySelector("#health dl").replaceChildren(...facts.flatMap(([term, text, level]) => [
     Object.assign(document.createElement("dt"), { textContent: term }),
-    Object.assign(document.createElement("dd"), { textContent: text, className: bad ? "bad" : "" }),
+    Object.assign(document.createElement("dd"), { textContent: text, className: level }),
   ]));
 }
 
