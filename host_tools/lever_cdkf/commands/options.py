@@ -151,8 +151,11 @@ def chosen_aircraft(args: argparse.Namespace) -> AircraftResponse | None:
     return read_response(name)
 
 
-def chosen_reading(args: argparse.Namespace, log: str) -> Reading | None:
-    """Return how `log` is to be read; None for a log of lever.dbc. Raise LeverError."""
+def chosen_reading(args: argparse.Namespace, log: str) -> Reading:
+    """Return how `log` is to be read. Raise LeverError."""
+    from ..signals.mapping import read_mapping
+    from ..signals.reading import Reading
+
     start, length = check_part(args)
     if not (args.map or args.dbc):
         from ..signals.tables import is_table
@@ -160,9 +163,6 @@ def chosen_reading(args: argparse.Namespace, log: str) -> Reading | None:
         if log == "-" or not is_table(log):
             if args.clock is not None:
                 raise LeverError("--clock goes with --map")
-            return None
-    from ..signals.mapping import read_mapping
-    from ..signals.reading import Reading
-
+            return Reading(channel=args.channel, start=start, length=length, is_of_lever_dbc=True)
     mapping = read_mapping(args.map) if args.map else None
     return Reading(mapping, args.dbc, args.channel, args.clock, start, length)

@@ -139,9 +139,8 @@ def _options(args: argparse.Namespace, log: str, formats: Sequence[str]) -> Opti
 
     assignments = options.chosen_assignments(args)
     chosen_here = {what: str(name) for what, name in assignments.items() if what in CHOICES}
-    reading = options.chosen_reading(args, log)
     return Options(
-        *(make_config(assignments), chosen_here, args.channel, reading, *options.check_part(args)),
+        *(make_config(assignments), chosen_here, options.chosen_reading(args, log)),
         formats=formats,
         aircraft=options.chosen_aircraft(args),
         inputs=options.input_files(args),

@@ -107,8 +107,7 @@ def run(args: argparse.Namespace) -> int:
 
     before = _settings(args)
     with Progress("tune") as progress:
-        reading = options.chosen_reading(args, args.log[0])
-        recording = read(args.log, args.channel, args.start, args.length, progress.show, reading)
+        recording = read(args.log, options.chosen_reading(args, args.log[0]), progress.show)
         before = _as_recorded(before, recording)
         likelihood = Likelihood(recording, args.held_out)
         likelihood.progress = progress.show

@@ -153,7 +153,8 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
     from ..watch.sources import BusSource, LogSource
 
     config = Config() if settings is None else make_config(read_assignments(settings))
-    if args.log is not None and (reading := options.chosen_reading(args, args.log)) is not None:
+    reading = None if args.log is None else options.chosen_reading(args, args.log)
+    if reading is not None and not reading.is_of_lever_dbc:
         from ..watch.mapped import MappedLogSource
 
         return MappedLogSource(args.log, reading, config, aircraft), config
@@ -170,8 +171,8 @@ def _source(args: argparse.Namespace) -> tuple[Source, Config]:
         return MappedBusSource(args.interface, args.channel, online, config, of_bus, aircraft), config
     if aircraft is not None:
         raise LeverError("--aircraft goes with --map: an estimator on the bus has its own (`lever_can --aircraft`)")
-    if args.log is not None:
-        return LogSource(args.log, args.channel, part=options.check_part(args)), config
+    if reading is not None:
+        return LogSource(args.log, reading.channel, part=(reading.start, reading.length)), config
     check_others_can_be_heard(args.interface)
     return BusSource(args.interface, args.channel, chosen_options(args)), config
 

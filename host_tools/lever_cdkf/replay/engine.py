@@ -14,7 +14,6 @@ from ..can import codec
 from ..can.bulk import FRAME, RECORDED, SLOTS, Feeder, Frames, Rows
 from ..can.estimator_frames import EstimatorFrames
 from ..can.identity import Identity
-from ..can.logs import Recording
 from ..exports.signal_files import calendar
 from ..firmware.aircraft import AircraftResponse
 from ..firmware.library import enum_names
@@ -28,7 +27,7 @@ from ..results.trace import Trace
 from ..runtime.extras import missing
 from ..runtime.files import Outputs, write_text
 from ..runtime.provenance import printable, provenance
-from ..signals.mapped_frames import MappedFrames
+from ..signals.mapped_frames import MappedFrames, frames_for_estimator
 from ..signals.reading import Reading
 from .columns import Columns, model_numbers
 from .commands_in_log import Commands
@@ -57,13 +56,8 @@ class Options:
     config: Config = field(default_factory=Config)
     chosen: Mapping[str, str] = field(default_factory=dict)
     """Choices of `config` (model, estimator …) that no COMMAND in the log may change."""
-    channel: str | None = None
-    """The bus with the samples; by default the only one that has any."""
-    reading: Reading | None = None
-    """How samples are made of logs that do not speak lever.dbc; their sample period becomes `config`'s."""
-    start: float = 0.0
-    """[s] of recorded time; COMMAND frames before it count."""
-    length: float = float("inf")
+    reading: Reading = field(default_factory=lambda: Reading(is_of_lever_dbc=True))
+    """What is read; the sample period of logs that do not speak lever.dbc becomes `config`'s."""
     formats: Sequence[str] = ("csv",)
     """Of the signals, of formats.FORMATS."""
     aircraft: AircraftResponse | None = None
@@ -87,11 +81,8 @@ def replay(
     none, and hand the trace, reduced, to `keep`. Raise LeverError, also rather than write over a log.
     """
     logs = list(logs)
-    traffic: EstimatorFrames | MappedFrames
-    if options.reading is None:
-        traffic = EstimatorFrames(Recording(logs), options.channel, options.start, options.length)
-    else:
-        traffic = MappedFrames(logs, options.reading, progress)
+    traffic = frames_for_estimator(logs, options.reading, progress)
+    if isinstance(traffic, MappedFrames):
         options = replace(options, config=traffic.at_its_rate(options.config))
     with ExitStack() as stack:
         folder = None
@@ -142,8 +133,7 @@ class _Replay:
 
     def _new_estimator(self) -> Estimator:
         estimator = Estimator(self._options.config)
-        if self._options.aircraft is not None:
-            estimator.watch(self._options.aircraft)
+        estimator.watch(self._options.aircraft)
         return estimator
 
     def _feed(self, frames: Frames, last: bool = False) -> None:

@@ -9,6 +9,8 @@ import numpy as np
 
 from ..can import codec
 from ..can.bulk import FRAME, Frames
+from ..can.estimator_frames import EstimatorFrames
+from ..can.logs import Recording
 from ..firmware.config import Config
 from .reading import Loaded, Progress, Reading, read
 from .resample import Samples, at_period
@@ -63,3 +65,12 @@ class MappedFrames:
         frames = frames_of(self.loaded.samples)
         for first in range(0, len(frames), _SAMPLES_AT_ONCE):
             yield frames[first : first + _SAMPLES_AT_ONCE]
+
+
+def frames_for_estimator(
+    logs: Sequence[str | Path], reading: Reading, progress: Progress | None = None
+) -> EstimatorFrames | MappedFrames:
+    """Return the frames in logs, as they are or of what is mapped. Raise LeverError."""
+    if reading.is_of_lever_dbc:
+        return EstimatorFrames(Recording(logs), reading.channel, reading.start, reading.length)
+    return MappedFrames(logs, reading, progress)

@@ -27,17 +27,20 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Reading:
-    """How samples are made of something that does not speak lever.dbc."""
+    """How samples are made of a log or file, and of which part of it."""
 
     mapping: Mapping | None = None
-    """None: a file that this tool has written, whose columns it knows."""
+    """None: a file that this tool has written, whose columns it knows; or a log of lever.dbc."""
     database: str | None = None
     """Path of the DBC, for logs of a bus."""
     channel: str | None = None
+    """The bus with the samples; by default the only one that has any."""
     clock: str | None = None
     start: float = 0.0
     """[s] since the first frame or row."""
     length: float = float("inf")
+    is_of_lever_dbc: bool = False
+    """Its frames are the estimator's own: nothing is mapped. COMMAND frames before the part count."""
 
 
 @dataclass

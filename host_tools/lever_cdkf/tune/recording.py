@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..can import codec, logs
-from ..can.estimator_frames import INPUTS, EstimatorFrames, why_refused
+from ..can import codec
+from ..can.estimator_frames import INPUTS, why_refused
 from ..errors import LeverError
 from ..firmware.config import Config, setting
 from ..firmware.estimator import Health
 from ..firmware.innovations import FRAME, samples_of
 from ..numeric.arrays import Array
-from ..signals.mapped_frames import MappedFrames
+from ..signals.mapped_frames import frames_for_estimator
 from ..signals.reading import Reading
 
 
@@ -56,22 +56,12 @@ class Recording:
 
 def read(
     paths: Sequence[str | os.PathLike[str]],
-    channel: str | None = None,
-    start: float = 0.0,
-    length: float = float("inf"),
-    progress: Callable[[int, int, str], None] | None = None,
     reading: Reading | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
 ) -> Recording:
-    """Return the samples on the bus `channel` (if not given: the one that has any); raise LeverError.
-
-    They are those from `start` on for `length`, both [s] of recorded time; with `reading`, of a log that does not speak
-    lever.dbc.
-    """
-    traffic: EstimatorFrames | MappedFrames
-    if reading is None:
-        traffic = EstimatorFrames(logs.Recording(paths), channel, start, length)
-    else:
-        traffic = MappedFrames(list(map(str, paths)), reading)
+    """Return the samples that `reading` says, or all of lever.dbc; raise LeverError."""
+    reading = reading or Reading(is_of_lever_dbc=True)
+    traffic = frames_for_estimator(list(map(str, paths)), reading)
     log, inputs = traffic.recording, [codec.message(name).frame_id for name in INPUTS]
     pieces = []
     for chunk in traffic.chunks():
@@ -79,7 +69,7 @@ def read(
         if progress is not None:
             progress(log.done, log.size, "reading the log")
     name = ", ".join(log.paths)
-    if channel is None and traffic.other_samples:
+    if reading.channel is None and traffic.other_samples:
         buses = " or --channel ".join(sorted({str(traffic.channel), *traffic.other_samples}))
         raise LeverError(f"{name}: samples on more than one bus: choose by --channel {buses}")
     return _recording(np.concatenate(pieces), str(traffic.channel), name)

@@ -13,6 +13,7 @@ from lever_cdkf.can import codec
 from lever_cdkf.firmware.native import Config, lib
 from lever_cdkf.replay.engine import Options, replay
 from lever_cdkf.results.summary import ReplaySummary, Snapshots
+from lever_cdkf.signals.reading import Reading
 from lever_sil.run import buslog
 from lever_sil.run.runner import simulate
 from lever_sil.scenarios.scenario import Scenario, load
@@ -155,7 +156,7 @@ def test_choices_before_the_log_are_told(tmp_path: Path) -> None:
 
 def test_a_part_by_its_time(lines: list[str], tmp_path: Path) -> None:
     """COMMANDs before it come first; they are in the state of the snapshot."""
-    found, summary = counts(lines, tmp_path, start=3.3)
+    found, summary = counts(lines, tmp_path, reading=Reading(start=3.3, is_of_lever_dbc=True))
     assert summary.recording.commands > 0
     assert found.begun_at_s == pytest.approx(0.2, abs=0.002)
     assert (found.equal, found.different) == (3, 0)
