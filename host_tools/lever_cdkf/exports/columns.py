@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from datetime import datetime
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,18 @@ class Column:
         if not self.held:
             return np.ones(len(published), np.bool_)
         return recorded if self.kind == RECORDED else published
+
+
+@dataclass(frozen=True)
+class Head:
+    """What every file of a run says before its samples."""
+
+    columns: list[Column]
+    start_us: int
+    """Of time_s = 0 [us since 1970]; next to 0 where it is not known, as in a simulation."""
+    created: datetime
+    properties: Mapping[str, str]
+    """Provenance, and the date of the start where it is known."""
 
 
 def columns(names: Iterable[str], model: str) -> list[Column]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..results.trace import Trace, write_csv_header, write_csv_rows
 from ..runtime.files import Growing, writing
-from .head import Head
+from .columns import Head
 
 
 class Csv(Growing):

@@ -19,8 +19,7 @@ from ..can import codec
 from ..results.trace import Trace
 from ..runtime.extras import require
 from ..runtime.files import Growing, writing
-from .columns import RECORDED, TEXT, Column, as_words, together
-from .head import Head
+from .columns import RECORDED, TEXT, Column, Head, as_words, together
 
 _DIGITS = 9
 

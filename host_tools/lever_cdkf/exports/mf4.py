@@ -23,8 +23,7 @@ from ..numeric.arrays import FloatArray
 from ..results.trace import Trace
 from ..runtime.extras import require
 from ..runtime.files import writing
-from .columns import RECORDED, TEXT, TRUTH, Column, together, words
-from .head import Head
+from .columns import RECORDED, TEXT, TRUTH, Column, Head, together, words
 
 _NOT_KNOWN = 0xFFFFFFFF
 """In the place of NaN."""

@@ -17,8 +17,7 @@ from ..numeric.arrays import FloatArray
 from ..results.trace import WHOLE, Trace
 from ..runtime.extras import require
 from ..runtime.files import Growing, writing
-from .columns import TEXT, as_words
-from .head import Head
+from .columns import TEXT, Head, as_words
 
 
 class Parquet(Growing):

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from ..cli.formats import FORMATS
 from ..results.trace import Trace
 from ..runtime.provenance import Provenance
-from .columns import columns
+from .columns import Head, columns
 from .csv import Csv
-from .head import Head
 from .mcap import Mcap
 from .mf4 import Mf4
 from .parquet import Parquet

@@ -122,18 +122,18 @@ void controller_report(fmu_t *fmu)
     const double time = fmu->start_time + ((double)fmu->samples * fmu->period);
     for (uint32_t i = 0u; i < (uint32_t)FAULTS; i++) {
         const uint32_t bit = (uint32_t)1u << i;
-        if (((health.faults ^ controller->faults) & bit) != 0u) {
+        if (((health.faults ^ controller->input.faults) & bit) != 0u) {
             fmu_log(fmu, fmi3OK, "%s %s at %.6g s", model_variable[(uint32_t)AT_fault_theta + i].name,
                 ((health.faults & bit) != 0u) ? "raised" : "gone", time);
         }
     }
-    if ((uint32_t)health.mode != controller->mode) {
+    if ((uint32_t)health.mode != controller->input.mode) {
         static const char *const name[] = {"init", "align", "run", "coast", "frozen", "fault"};
         fmu_log(fmu, (health.mode == LEVER_MODE_FAULT) ? fmi3Warning : fmi3OK, "mode %s at %.6g s", name[health.mode],
             time);
     }
-    controller->faults = health.faults;
-    controller->mode = (uint32_t)health.mode;
+    controller->input.faults = health.faults;
+    controller->input.mode = (uint32_t)health.mode;
 }
 
 fmi3Status model_step(fmu_t *fmu)
@@ -198,38 +198,26 @@ void model_put_outputs(fmu_t *fmu)
 
 /* --- state -------------------------------------------------------------------------------------------------------- */
 
-/* What a controller_t has besides memory, configuration and pointer. */
-typedef struct rest {
-    controller_input_t input;
-    uint32_t faults;
-    uint32_t mode;
-} rest_t;
-
 size_t model_state_size(const fmu_t *fmu)
 {
     (void)fmu;
-    return sizeof(rest_t) + (size_t)LEVER_STATE_BYTES;
+    return sizeof(controller_input_t) + (size_t)LEVER_STATE_BYTES;
 }
 
 void model_state_save(const fmu_t *fmu, uint8_t *state)
 {
     const controller_t *controller = fmu->model;
-    (void)memcpy(&state[offsetof(rest_t, input)], &controller->input, sizeof controller->input);
-    (void)memcpy(&state[offsetof(rest_t, faults)], &controller->faults, sizeof controller->faults);
-    (void)memcpy(&state[offsetof(rest_t, mode)], &controller->mode, sizeof controller->mode);
-    lever_state_save(controller->lever, &state[sizeof(rest_t)]);
+    (void)memcpy(state, &controller->input, sizeof controller->input);
+    lever_state_save(controller->lever, &state[sizeof controller->input]);
 }
 
 bool model_state_restore(fmu_t *fmu, const uint8_t *state, size_t size)
 {
     controller_t *controller = fmu->model;
-    controller_input_t *input = &controller->input;
-    if ((size != model_state_size(fmu)) || !input_is_usable(&state[offsetof(rest_t, input)]) ||
-        !lever_state_restore(controller->lever, &state[sizeof(rest_t)])) {
+    if ((size != model_state_size(fmu)) || !input_is_usable(state) ||
+        !lever_state_restore(controller->lever, &state[sizeof controller->input])) {
         return false;
     }
-    (void)memcpy(input, &state[offsetof(rest_t, input)], sizeof *input);
-    (void)memcpy(&controller->faults, &state[offsetof(rest_t, faults)], sizeof controller->faults);
-    (void)memcpy(&controller->mode, &state[offsetof(rest_t, mode)], sizeof controller->mode);
+    (void)memcpy(&controller->input, state, sizeof controller->input);
     return true;
 }

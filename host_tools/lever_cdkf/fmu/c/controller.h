@@ -42,6 +42,8 @@ typedef struct controller_input {
     uint32_t transmit_errors; /* of the node's error counters */
     uint32_t receive_errors;
     uint32_t status; /* enum can_status */
+    uint32_t faults; /* that have been reported */
+    uint32_t mode;
     uint32_t bus_offs;
     uint32_t dropped;    /* frames, since the last report to the estimator */
     uint8_t is_received; /* Rx_Clock ticks */
@@ -56,6 +58,8 @@ typedef struct controller_input {
     double dither_rms;  /* of it; NaN: there was none yet */
     uint32_t idle_us;   /* without a sample, since lever_idle() */
     uint32_t missing;   /* inputs that have been reported as missing, a bit each */
+    uint32_t faults;    /* that have been reported */
+    uint32_t mode;
     uint8_t freezes;
     uint8_t resets;
 } controller_input_t;
@@ -65,10 +69,7 @@ typedef struct controller {
     lever_memory_t memory;
     lever_config_t config;
     lever_t *lever;
-    /* state besides the estimator's */
-    controller_input_t input;
-    uint32_t faults; /* that have been reported */
-    uint32_t mode;
+    controller_input_t input; /* state besides the estimator's */
 } controller_t;
 
 /* Says what is new since the last sample, as events. */

@@ -26,6 +26,18 @@ typedef struct saved {
     uint8_t bytes[];
 } saved_t;
 
+/* Room for a state; NULL: none left, which is said. */
+static saved_t *new_saved(fmu_t *fmu, size_t size)
+{
+    saved_t *saved = calloc(1u, sizeof *saved + size);
+    if (saved != NULL) {
+        saved->size = size;
+    } else {
+        fmu_log(fmu, fmi3Error, "no memory left for a state");
+    }
+    return saved;
+}
+
 static bool has_model_state(const fmu_t *fmu)
 {
     return (fmu->phase >= (uint32_t)FMU_INITIALIZING) && !fmu->changed;
@@ -63,15 +75,12 @@ fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *state)
     fmu_t *fmu = instance;
     const size_t size = values_size() + (has_model_state(fmu) ? model_state_size(fmu) : 0u);
     fmi3FreeFMUState(instance, state);
-    saved_t *saved = calloc(1u, sizeof *saved + size);
-    if (saved == NULL) {
-        fmu_log(fmu, fmi3Error, "no memory left for a state");
-        return fmi3Error;
+    saved_t *saved = new_saved(fmu, size);
+    if (saved != NULL) {
+        save(fmu, saved->bytes);
+        *state = saved;
     }
-    saved->size = size;
-    save(fmu, saved->bytes);
-    *state = saved;
-    return fmi3OK;
+    return (saved != NULL) ? fmi3OK : fmi3Error;
 }
 
 /* Why bytes are no state of this FMU; NULL: they are one. */
@@ -103,14 +112,11 @@ static bool restore(fmu_t *fmu, const uint8_t *bytes, size_t size)
     const size_t values = model_variables * sizeof fmu->value[0];
     (void)memcpy(&head, bytes, sizeof head);
     (void)memcpy(fmu->value, &bytes[sizeof head], values);
-    bool is_whole = true;
+    bool is_whole = (head.phase < (uint32_t)FMU_INITIALIZING);
+    fmu->changed = true;
     if (size > values_size()) {
-        fmu->changed = true;
         is_whole =
             (fmu_started(fmu) == fmi3OK) && model_state_restore(fmu, &bytes[values_size()], size - values_size());
-    } else {
-        fmu->changed = true;
-        is_whole = (head.phase < (uint32_t)FMU_INITIALIZING);
     }
     (void)memcpy(fmu->value, &bytes[sizeof head], values);
     (void)memcpy(fmu->given, &bytes[sizeof head + values], model_variables);
@@ -170,13 +176,10 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[]
         fmu_log(instance, fmi3Error, "%zu bytes are no state of this FMU: %s", size, wrong);
         return fmi3Error;
     }
-    saved_t *saved = calloc(1u, sizeof *saved + size);
-    if (saved == NULL) {
-        fmu_log(instance, fmi3Error, "no memory left for a state");
-        return fmi3Error;
+    saved_t *saved = new_saved(instance, size);
+    if (saved != NULL) {
+        (void)memcpy(saved->bytes, bytes, size);
+        *state = saved;
     }
-    saved->size = size;
-    (void)memcpy(saved->bytes, bytes, size);
-    *state = saved;
-    return fmi3OK;
+    return (saved != NULL) ? fmi3OK : fmi3Error;
 }

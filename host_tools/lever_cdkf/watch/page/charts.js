@@ -50,11 +50,7 @@ function drawMagnitude({ start, update }, frequency) {
   for (const [time, column] of past) {
     axes.line(start.map_frequencies, column, "estimate", { width: 1, alpha: 0.3 * (1 - (now - time) / PAST) });
   }
-  if (bode) {
-    axes.band(start.frequencies, bode.low, bode.high, "estimate-band");
-    axes.line(start.frequencies, bode.magnitude, "estimate", { width: 2.2 });
-  } else axes.say("no estimate yet");
-  if (update?.truth) axes.line(start.frequencies, update.truth, "truth", TRUTH);
+  drawResponse(axes, start.frequencies, bode?.magnitude, bode?.low, bode?.high, update?.truth);
 }
 
 function drawPhase({ start, update }, frequency) {
@@ -64,11 +60,15 @@ function drawPhase({ start, update }, frequency) {
   for (let tick = low; tick <= high; tick += high - low > 180 ? 90 : 45) ticks.push(tick);
   const limits = { low: low - 15, high: high + 15, ticks };
   const axes = new Axes(document.getElementById("phase"), "phase [deg]", frequency, limits);
-  if (bode) {
-    axes.band(start.frequencies, bode.phase_low, bode.phase_high, "estimate-band");
-    axes.line(start.frequencies, bode.phase, "estimate", { width: 2.2 });
+  drawResponse(axes, start.frequencies, bode?.phase, bode?.phase_low, bode?.phase_high, update?.truth_phase);
+}
+
+function drawResponse(axes, frequencies, middle, low, high, truth) {
+  if (middle) {
+    axes.band(frequencies, low, high, "estimate-band");
+    axes.line(frequencies, middle, "estimate", { width: 2.2 });
   } else axes.say("no estimate yet");
-  if (update?.truth_phase) axes.line(start.frequencies, update.truth_phase, "truth", TRUTH);
+  if (truth) axes.line(frequencies, truth, "truth", TRUTH);
 }
 
 // Measured, and what chance alone would give.
