@@ -12,7 +12,7 @@ from ..cli import layout
 from ..cli.tables import Row, add_json_option
 from ..errors import LeverError
 from ..runtime.files import check_not_input
-from .options import add_part_options, check_part
+from .options import add_part_options, check_part, option_words
 
 if TYPE_CHECKING:
     from ..signals.mapping import Mapping
@@ -64,6 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from ..signals.mapping import as_toml
     from ..signals.plots import KINDS, write
     from ..signals.proposal import propose
+    from ..signals.reading import all_signals
     from ..signals.recorded import notes_of
 
     start, length = check_part(args)
@@ -72,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
         raise LeverError(f"cannot write {args.out}: plots are {', '.join(KINDS)}; --toml FILE writes the mapping")
     for path in (args.toml, args.out, args.json):
         check_not_input(path, read)
-    signals = _signals(args, start, length)
+    signals = all_signals(args.log, args.dbc, args.channel, args.time, start, length)
     mapping, proposed, nearly = propose(signals, args.log)
     mapping = replace(mapping, time=args.time)
     inputs = {each.signal.name: each.key for each in proposed}
@@ -120,12 +121,6 @@ def _left_out(each: Candidate) -> str:
     return f"{each.key} is not mapped: {name} {lacks}, and may be something else; {option} takes it"
 
 
-def _signals(args: argparse.Namespace, start: float, length: float) -> list[Signal]:
-    from ..signals.reading import all_signals
-
-    return all_signals(args.log, args.dbc, args.channel, args.time, start, length)
-
-
 def _row(key: str, signal: Signal) -> Row:
     import numpy as np
 
@@ -146,12 +141,11 @@ def _row(key: str, signal: Signal) -> Row:
 
 def _signal_options(args: argparse.Namespace, mapping: Mapping, proposed: list[Candidate]) -> str:
     """Return the log and the proposal, as arguments of commands that read signals."""
-    database = f" --dbc {shlex.quote(args.dbc)}" if args.dbc else ""
     entries = []
     for each in proposed:
         source = mapping.sources[each.key]
         unit = f",unit={source.unit}" if source.unit != each.signal.unit else ""
         turned = ",sign=-1" if source.sign == -1 else ""
-        entries.append(shlex.quote(f"{each.key}={each.signal.name}{unit}{turned}"))
-    time = [shlex.quote(f"time={args.time}")] if args.time else []
-    return f"{shlex.quote(args.log)}{database} --map {' '.join([*entries, *time])}"
+        entries.append(f"{each.key}={each.signal.name}{unit}{turned}")
+    entries += [f"time={args.time}"] if args.time else []
+    return shlex.join([args.log, *option_words({"--dbc": args.dbc}), "--map", *entries])

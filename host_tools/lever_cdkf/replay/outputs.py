@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from types import TracebackType
 
 from ..can import bulk
 from ..can.bulk import Frames
@@ -43,10 +42,8 @@ class Folder:
     def __enter__(self) -> Folder:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self.signals.__exit__(kind, error, traceback)
+    def __exit__(self, *_: object) -> None:
+        self.signals.__exit__()
         if self._bus_log is not None:
             self._bus_log.abandon()
 

@@ -14,10 +14,11 @@ import numpy as np
 
 from ..can import codec, snapshots
 from ..can.bulk import Feeder, Frames
+from ..can.commander import KEEP
 from ..can.snapshots import Snapshot
 from ..firmware.config import CHOICES
 from ..firmware.estimator import Estimator, state_layout
-from ..firmware.library import enum_names, lib
+from ..firmware.library import enum_names
 from ..results.summary import Snapshots
 
 _LONGEST_US = 20_000_000
@@ -164,9 +165,7 @@ class Proof:
 
 def choices_of(estimator: Estimator) -> dict[str, str]:
     """As they stand, by its answer to a COMMAND that keeps them; the estimator is of no other use then."""
-    keep = {what: float(lib.LEVER_KEEP) for what in CHOICES}
-    data = codec.encode("COMMAND", 0, {"request": 0, "dither_rms": 65.535, **keep})
-    estimator.on_frame(codec.message("COMMAND").frame_id, data)
+    estimator.on_frame(codec.message("COMMAND").frame_id, codec.encode("COMMAND", 0, {"request": "none", **KEEP}))
     answer = estimator.next_frame()
     assert answer is not None
     _, fields = codec.decode(*answer)
