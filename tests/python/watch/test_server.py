@@ -280,7 +280,9 @@ def test_before_the_first_estimate_nothing_is_made_up(flight: Flight) -> None:
     assert update["bode"] is None
     assert update["coherence"] is None
     assert update["silence"] is None
-    assert [update[name] for name in ("foreign", "error_frames", "unseen")] == [0, 0, 0]
+    health = {name: text for name, text, _ in update["health"]}
+    assert not {"other frames", "error frames", "unseen"} & health.keys()
+    assert {health[name] for name in ("mode", "choices", "faults", "firmware")} == {"–"}
     assert update["mode"] is None
     assert set(update["row"][1:7]) == {None}
     assert (update["level"], update["condition"]) == ("watch", "no frame has come yet")
