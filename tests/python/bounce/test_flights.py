@@ -43,6 +43,15 @@ def test_a_gearing_goes_up_after_a_while() -> None:
     assert margins[-1] == pytest.approx(-20.0 * math.log10(3.0), abs=1e-3)
 
 
+def test_the_gusts_of_a_flight_are_as_strong_as_said() -> None:
+    """In a loop that is open: the base moves as the gusts do, by 0.05 g rms from 1 to 10 Hz."""
+    flown = flights.fly(Plan("uh60_like", 1, pilots.table(pilots.arm(1)), 1e-9, duration=20.0))
+    assert np.std(flown.z_ddot) == pytest.approx(0.05 * 9.81, rel=0.05)
+    power = np.abs(np.fft.rfft(flown.z_ddot)) ** 2
+    frequency = np.fft.rfftfreq(len(flown.time), flown.time[1])
+    assert power[(frequency >= 0.9) & (frequency <= 10.1)].sum() > 0.99 * power[1:].sum()
+
+
 def test_a_flight_is_quiet_or_a_limit_cycle() -> None:
     """Without mitigation, on both sides of the critical gearing."""
     plan = Plan("uh60_like", 2, pilots.table(pilots.arm(2, pilots.SLACK)), 1.0)
@@ -76,6 +85,10 @@ def test_the_error_of_a_stated_margin_is_from_the_true_one(sigma: float, covered
     stated["gain_margin_sigma"] = sigma
     figures = measure._margins(replace(flown, stability=stated))
     assert figures == pytest.approx({"margin covered": covered, "margin rms": 1.0, "margin stated": 100.0})
+    unknown = flown.notes <= 7.5  # half of what is judged
+    stated["state"][unknown], stated["gain_margin"][unknown] = lib.LEVER_BOUNCE_UNKNOWN, 40.0
+    figures = measure._margins(replace(flown, stability=stated))
+    assert figures == pytest.approx({"margin covered": covered, "margin rms": 1.0, "margin stated": 50.0}, rel=0.2)
 
 
 def test_a_correction_is_harmful_while_the_corrected_angle_swings_more(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,3 +111,19 @@ def test_a_correction_is_harmful_while_the_corrected_angle_swings_more(monkeypat
     assert measured.figures["adds for"] == pytest.approx(1.25, abs=0.1)
     jump = np.abs(np.diff(corrected - theta)[round(1e3 * measure.FAULT) :]).max()
     assert measured.figures["jump"] == pytest.approx(math.degrees(jump))
+
+
+def test_what_a_mitigation_makes_of_the_own_flying_is_over_that_without(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A gain of 0.8 and a lag of 0.1 rad, whatever the pilot's stroke."""
+
+    def flown(plan: Plan) -> SimpleNamespace:
+        gain, lag = (1.0, 0.0) if plan.mitigation == "none" else (0.8, 0.1)
+        time = 1e-3 * np.arange(60_000)
+        corrected = 0.3 + 0.035 * gain * np.sin(2.0 * np.pi * measure.VOLUNTARY * time - lag)
+        return SimpleNamespace(
+            time=time, corrected=corrected, during=lambda start, end: slice(*np.searchsorted(time, (start, end)))
+        )
+
+    monkeypatch.setattr(measure, "fly", flown)
+    figures = measure.voluntary("uh60_like", 1, mitigation="cancellation").figures
+    assert figures == pytest.approx({"gain changed": 20.0, "phase changed": math.degrees(0.1)})

@@ -143,6 +143,13 @@ def test_what_cannot_be_at_one_end_of_an_axis_is_said_and_left_to_its_runs(spec_
     assert spec_of(HEAD + THETA).doubts == ()
 
 
+def test_a_flight_that_can_be_is_found_between_the_ends(spec_of: SpecOf) -> None:
+    """Of an axis neither end of which can be."""
+    values = 'values = ["-1 mrad", "-2 mrad", "1 mrad", "-3 mrad"]\n'
+    spread = spec_of(HEAD + THETA.replace('values = ["1 mrad", "2 mrad"]\n', values))
+    assert spread.first.sensors.theta.noise == pytest.approx(1e-3)
+
+
 @pytest.mark.parametrize("name", spec.names())
 def test_shipped_specs(name: str) -> None:
     shipped = spec.load(name)

@@ -13,11 +13,14 @@ import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import ClassVar
 
 import can
+import numpy as np
 import pytest
 from can.interfaces import BACKENDS
+from lever_cdkf.can import recorder
 from lever_cdkf.can.recorder import Recorder
 from lever_cdkf.cli.main import main
 from lever_cdkf.runtime.provenance import sha256
@@ -154,6 +157,31 @@ def test_it_shows_how_it_goes(
     shown = capsys.readouterr().err.partition("Ctrl-C ends\n")[2]
     line = r"\d+ s, \d+ frames/s, 100 frames, 0 lost, 0 corrupt, 0 error frames, controller active"
     assert re.fullmatch(rf"(\r\x1b\[K{line})+\r\x1b\[K" if terminal else rf"(lever: record: {line}\n)+", shown)
+
+
+def test_on_a_quiet_bus_it_asks_ten_times_a_second_whether_to_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a clock that goes on only while the bus is waited for."""
+    clock = SimpleNamespace(now=0.0, monotonic=lambda: clock.now)
+
+    def wait(_bus: can.BusABC, timeout: float) -> None:
+        clock.now += timeout
+
+    monkeypatch.setattr(recorder, "time", clock)
+    monkeypatch.setattr(Line, "recv", wait)
+    asked: list[float] = []
+    told: list[float] = []
+
+    def ended() -> bool:
+        asked.append(clock.now)
+        return clock.now > 9.95
+
+    with Line("x") as bus:
+        Recorder(bus, tmp_path / "a.log", "x").run(ended, lambda it: told.append(it.elapsed))
+    assert asked == pytest.approx(np.arange(101) / 10.0, abs=1e-6)
+    assert len(told) in (9, 10)
+    assert np.diff(told) == pytest.approx(1.0, abs=0.11)
 
 
 @pytest.mark.parametrize(

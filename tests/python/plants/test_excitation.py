@@ -102,6 +102,14 @@ def test_pulses_have_their_amplitude_width_and_period_and_alternate() -> None:
     assert np.all(values[11_000:11_050] == -2.0)
 
 
+@pytest.mark.parametrize("period", ["1 ms", "0.6 ms", "0.1 ms"])
+def test_pulses_shorter_than_a_sample_are_one_a_sample(period: str) -> None:
+    values = sampled({"kind": "pulses", "amplitude": "2 m/s^2", "width": period, "period": period})
+    width = float(period.removesuffix(" ms")) > 0.5
+    assert np.all(values[0::2] == (2.0 if width else 0.0))
+    assert np.all(values[1::2] == (-2.0 if width else 0.0))
+
+
 @pytest.mark.parametrize(
     ("table", "message"),
     [

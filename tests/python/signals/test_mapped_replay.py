@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -292,14 +294,17 @@ def test_what_is_written_is_read_back(folder: Path, tmp_path: Path) -> None:
         assert again["samples"] == first["samples"]
 
 
-def test_tune_takes_the_same(folder: Path, tmp_path: Path) -> None:
-    """At 500 Hz nothing is lost."""
+def test_tune_takes_the_same(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """At 500 Hz nothing is lost; and the command that it prints reads the log in the same way."""
     arguments = ["--dbc", folder / "foreign.dbc", "--map", *MAPPED, "-o", tmp_path / "my.settings", "--length", "21"]
     arguments += ["--keep", "m_p_walk", "--keep", "c_p_walk", "--keep", "k_p_walk"]
-    arguments += ["--page", tmp_path / "tune.html"]
+    arguments += ["--page", tmp_path / "tune.html", "--clock", "z_ddot"]
     assert main(["tune", str(folder / "flight.blf"), *map(str, arguments)]) == 0
     assert "sample_period = 0.002" in (tmp_path / "my.settings").read_text()
     assert " lost)" not in (tmp_path / "tune.html").read_text()
+    words = shlex.split(capsys.readouterr().out.partition("Next:\n")[2].replace("\\\n", " "))
+    assert {("--clock", "z_ddot"), ("--dbc", str(folder / "foreign.dbc"))} <= set(itertools.pairwise(words))
+    assert main([*words[1:], "-o", str(tmp_path / "out"), "--format", "csv"]) == 0
 
 
 # --- errors ----------------------------------------------------------------------------------------------------------

@@ -22,6 +22,12 @@ def test_arm_and_shaping_filter_may_be_exchanged() -> None:
     np.testing.assert_allclose(one, other, rtol=1e-3)
 
 
+@pytest.mark.parametrize("base", BASES)
+def test_each_base_shakes_by_a_tenth_of_g(base: str) -> None:
+    _, z_ddot, _ = runs(base, 2, 4.0)
+    assert np.std(z_ddot, axis=1) == pytest.approx(0.981, rel=0.05)
+
+
 @pytest.fixture(scope="module")
 def flat() -> tuple[np.ndarray, np.ndarray]:
     y, _, truth = runs(FLAT, 3, 30.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -136,6 +137,24 @@ def test_other_sample_periods_are_noticed(tmp_path: Path, lever: Run) -> None:
     assert read_assignments(tmp_path / "slow.settings")["sample_period"] == 0.01
 
 
+def test_the_next_command_reads_the_log_as_this_one(tmp_path: Path, lever: Run) -> None:
+    """From the same bus of it, and by the same identifiers."""
+    log, out = tmp_path / "two buses.log", tmp_path / "my.settings"
+    for bus in ("can1", "can0"):
+        write_log(tmp_path / bus, count=3000, period_us=10_000, bus=bus, offset=0x40 if bus == "can0" else 0)
+    lines = sorted(line for bus in ("can0", "can1") for line in (tmp_path / bus).read_text().splitlines())
+    log.write_text("\n".join(lines) + "\n")
+    options = ("--channel", "can0", "--id-offset", "0x40")
+    _, printed, _ = lever("tune", log, *options, *QUICK, "-o", out, "--held-out", "0")
+    words = shlex.split(printed.partition("Next:\n")[2].replace("\\\n", " "))
+    assert words[:3] == ["lever", "replay", str(log)]
+    status, printed, _ = lever(*words[1:], "-o", tmp_path / "replayed")
+    assert status == 0
+    summary = json.loads((tmp_path / "replayed/summary.json").read_text())
+    assert summary["samples"] == 3000
+    assert summary["estimator"]["settings"]["theta_noise"] == read_assignments(out)["theta_noise"]
+
+
 def test_choices_are_those_of_the_log(tmp_path: Path, lever: Run) -> None:
     """A COMMAND in the log says which model was estimated, if nobody says otherwise."""
     lever("sim", "linear_physical", "--set", "duration=25 s", "--out", tmp_path)
@@ -150,7 +169,9 @@ def test_choices_are_those_of_the_log(tmp_path: Path, lever: Run) -> None:
     assert read_assignments(out)["model"] == "lever"
 
 
-def write_log(path: Path, count: int, period_us: int = 1000, bus: str = "can0", counts: bool = True) -> None:
+def write_log(
+    path: Path, count: int, period_us: int = 1000, bus: str = "can0", counts: bool = True, offset: int = 0
+) -> None:
     """candump's format: a lever that swings a little, with noise; `counts`: the E2E counters do."""
     lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
     noise = np.random.default_rng(1).standard_normal((count, 3)) * (1e-3, 1e-2, 1.0)
@@ -159,7 +180,7 @@ def write_log(path: Path, count: int, period_us: int = 1000, bus: str = "can0", 
             time = k * period_us
             counter = k if counts else 3
             lever = lever_sample(counter, 0.35 + theta, theta_dot, 0.0)
-            lines = (0x110, lever), (0x111, base_sample(counter, z_ddot, time))
+            lines = (0x110 + offset, lever), (0x111 + offset, base_sample(counter, z_ddot, time))
             for identifier, data in lines:
                 log.write(f"({time / 1e6:.6f}) {bus} {identifier:03X}#{data.hex().upper()}\n")
 
