@@ -163,19 +163,20 @@ def test_on_a_quiet_bus_it_asks_ten_times_a_second_whether_to_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By a clock that goes on only while the bus is waited for."""
-    clock = SimpleNamespace(now=0.0, monotonic=lambda: clock.now)
-
-    def wait(_bus: can.BusABC, timeout: float) -> None:
-        clock.now += timeout
-
-    monkeypatch.setattr(recorder, "time", clock)
-    monkeypatch.setattr(Line, "recv", wait)
+    now = 0.0
     asked: list[float] = []
     told: list[float] = []
 
+    def wait(_bus: can.BusABC, timeout: float) -> None:
+        nonlocal now
+        now += timeout
+
     def ended() -> bool:
-        asked.append(clock.now)
-        return clock.now > 9.95
+        asked.append(now)
+        return now > 9.95
+
+    monkeypatch.setattr(recorder, "time", SimpleNamespace(monotonic=lambda: now))
+    monkeypatch.setattr(Line, "recv", wait)
 
     with Line("x") as bus:
         Recorder(bus, tmp_path / "a.log", "x").run(ended, lambda it: told.append(it.elapsed))
