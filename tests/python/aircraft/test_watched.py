@@ -155,6 +155,10 @@ def test_a_file_holds_the_response(tmp_path: Path, capsys: pytest.CaptureFixture
         assert list(getattr(kept, name)) == pytest.approx(list(getattr(written, name)), rel=1e-5)
     for name in ("gain_sigma", "phase_sigma", "warning", "alarm"):
         assert getattr(kept, name) == pytest.approx(getattr(written, name))
+    assert main(["aircraft", "uh60_like", "gearing=0.5", "alarm=1"]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    lines = path.read_text().splitlines()
+    assert [each for each in printed if each[0] != "#"] == [each for each in lines if each[0] != "#"]
     assert main(["aircraft"]) == 0
     assert "puma_like" in capsys.readouterr().out
 

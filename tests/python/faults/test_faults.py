@@ -177,6 +177,21 @@ def test_a_demand_that_is_not_kept_is_named(what: str, right: Record, pilot: Pil
     assert set(broken) <= {what, "error after"}
 
 
+@pytest.mark.parametrize(
+    ("requirement", "words"),
+    [
+        (judge.Requirement(unaffected=True), "not a bit changes"),
+        (judge.Requirement(("CLOCK",)), "CLOCK within 1 sample, mode run"),
+        (
+            judge.Requirement(("CLOCK", "BASE"), 3, ("LEVER",), mode=("init", "run"), torque_ends=0.06),
+            "CLOCK or BASE within 3 samples, LEVER at its end, mode init or run, no torque after 0.06 s",
+        ),
+    ],
+)
+def test_what_a_row_demands_is_said(requirement: judge.Requirement, words: str) -> None:
+    assert table.demands(requirement) == words
+
+
 def test_bad_input_is_one_line(refused: Refused) -> None:
     assert "did you mean theta_stuck?" in refused("faults", "--only", "theta_stucl")
     assert "from 1 to 1000" in refused("faults", "--seeds", "0")

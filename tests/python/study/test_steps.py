@@ -65,6 +65,7 @@ def test_process_noise_is_that_of_the_step() -> None:
         kicks = kick * np.random.default_rng(2).standard_normal((runs, samples - 1, substeps))
         nothing = np.tile((2.5, 0.0, 0.0), (runs, samples, 1))
         x = follow(free, nothing, np.zeros((runs, samples, 2)), 0.3, kicks, PERIOD)
+        np.testing.assert_allclose(x[:, -1, 1], kicks.sum(axis=(1, 2)), rtol=0, atol=1e-9)
         low, high = chi2.ppf((5e-4, 1.0 - 5e-4), runs)
         assert low < np.sum(np.square(x[:, -1, 1])) / (q**2 * (samples - 1) * PERIOD) < high
 

@@ -95,6 +95,16 @@ def test_the_machine_and_what_else_is_on_the_bus_have_rows(flight: Flight) -> No
     assert "restarts" not in table
 
 
+def test_the_end_and_an_error_are_said_instead_of_the_state() -> None:
+    """Whether nothing more can come matters more than how long nothing has come."""
+    picture, source = Picture(), Quiet()
+    assert panels.condition(picture, source).plain == "● no frame has come yet"
+    source.ended = True
+    assert panels.condition(picture, source).plain == "● the end: nothing more will come"
+    source.error = "Network is down"
+    assert panels.condition(picture, source).plain == "● Network is down"
+
+
 @pytest.mark.parametrize("lost", [0, 10])
 def test_faults_and_losses_are_yellow(lost: int, flight: Flight) -> None:
     picture = Picture()

@@ -318,10 +318,14 @@ def test_a_page_that_does_not_read_piles_nothing_up(on_server: Callable[..., Fli
             sent, let_go, tell = [], [], page.tell
             page.tell = lambda message: (sent.append(message), tell(message))[1]  # type: ignore[method-assign, func-returns-value]
             page.close = lambda *why: let_go.append(why)  # type: ignore[method-assign]
+            missed = 0
             while not let_go:
+                before = len(sent)
                 page.update(["x" * 100_000])
+                missed = missed + 1 if len(sent) == before else 0
                 await asyncio.sleep(0)
             assert let_go[0] == (1013, "too slow")
+            assert missed == 51, "fifty in a row are forgiven"
             assert 1 <= len(sent) < 200  # what the kernel's buffers take, and no more
 
     on_server(story)
