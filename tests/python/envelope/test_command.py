@@ -123,13 +123,17 @@ def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "0 of 2 conditions hold. Missed: missed, unknown." in printed
     assert re.search(r"^reported +reported ", printed, re.MULTILINE)
     assert table.MISSED in printed
+    assert f"Written to {tmp_path}: envelope.html" in " ".join(printed.split())
 
 
 @pytest.mark.usefixtures("short")
-def test_without_out_no_file_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_out_no_file_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["envelope", "--only", "reported", "--seeds", "1"]) == 0
     assert list(tmp_path.iterdir()) == []
+    assert "Written" not in capsys.readouterr().out
 
 
 def test_a_figure_shows_on_which_side_of_its_limit_it_is() -> None:

@@ -85,6 +85,12 @@ def test_a_session(desktop: Browser, start_lever: Start) -> None:
     desktop.wait("Array.from(document.querySelectorAll('#messages td'), e => Number(e.textContent)).some(n => n > 900)")
     for canvas in ("#magnitude", "#phase", "#coherence", "#magnitude-map", "#bands canvas", "#health canvas"):
         assert drawn(desktop, canvas) > 20, canvas
+    terms = "Array.from(document.querySelectorAll('#health dt'), e => [e.textContent, e.nextSibling.textContent])"
+    health = dict(desktop.run(terms))
+    assert float(health["lever angle"].removesuffix(" deg")) == pytest.approx(20.0, abs=5.0)
+    assert health["choices"] == "lever, trim, dual, robbins_monro, none"
+    assert re.fullmatch(r"\d+ lost, \d+ corrupt, \d+ late, \d+ restarts", health["estimator counts"])
+    assert health["firmware"][0].isdigit()
 
     assert desktop.run("document.querySelector('[data-request=run]').ariaPressed") == "true"
     desktop.click("[data-request=freeze]")
