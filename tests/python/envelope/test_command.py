@@ -77,7 +77,10 @@ def test_a_run_is_the_same_whoever_is_simulated_beside_it(monkeypatch: pytest.Mo
     ]
     together = run_conditions.run(rows, {}, 3, lambda *_: None)
     monkeypatch.setattr(run_conditions, "LANE_SECONDS", 6.0)
-    apart = run_conditions.run(rows, {}, 3, lambda *_: None)
+    shown: list[tuple[int, int, str]] = []
+    apart = run_conditions.run(rows, {}, 3, lambda *progress: shown.append(progress))
+    assert {what for _, _, what in shown} == {"simulating", "sway", "steady"}
+    assert all(0 <= done < total for done, total, _ in shown)
     for left, right in zip(together, apart, strict=True):
         assert left.condition is right.condition
         assert left.runs == right.runs == ["seed 0", "seed 1", "seed 2"]

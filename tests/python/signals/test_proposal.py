@@ -45,6 +45,20 @@ def short(flight: Flight) -> Flight:
     return Flight(*(values[:700] for values in (slow.time, slow.theta, slow.theta_dot, slow.z_ddot)))
 
 
+@pytest.mark.parametrize(("low", "high", "together"), [(2.0, 8.0, True), (10.0, 20.0, False)])
+def test_what_moves_with_the_base_does_so_where_a_lever_can(low: float, high: float, together: bool) -> None:
+    """Two signals of noise that are the same in one band: from 2 to 8 Hz it counts, and what motors do above not."""
+    time, random = 0.01 * np.arange(6000), np.random.default_rng(1)
+    frequency = np.fft.rfftfreq(len(time), 0.01)
+    in_band = (frequency > low) & (frequency < high)
+    spectra = np.fft.rfft(random.standard_normal((3, len(time))))
+    base, lever = (np.fft.irfft(np.where(in_band, spectra[2], own)) for own in spectra[:2])
+    signals = [Signal("LeverAngle", time, 20.0 + lever, "deg"), Signal("AccVert", time, 1.0 + 0.1 * base, "g")]
+    _, proposed, _ = proposal.propose(signals, "a test")
+    why = next(each.why for each in proposed if each.key == "theta")
+    assert any(words.startswith("moves with AccVert") for words in why) == together
+
+
 @pytest.mark.parametrize("fleet", [AIRCRAFT, WITH_TORQUE, WITHHELD], ids=["no torque", "torque", "withheld"])
 def test_at_least_eight_of_ten_are_right(fleet: list[Aircraft], short: Flight, tmp_path: Path) -> None:
     wrong = {}

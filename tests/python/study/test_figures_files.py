@@ -184,6 +184,13 @@ def test_the_table_holds_what_is_drawn(folder: Path) -> None:
                 surface = rows[rows["series"] == ""].astype({"frequency_Hz": float, "time_s": float})
                 grid = surface.pivot(index="frequency_Hz", columns="time_s", values="value")
                 np.testing.assert_allclose(grid.to_numpy(), column.content.magnitude, rtol=1e-6)
+                ridge = rows[rows["series"] == column.content.ridge_name]
+                for named, drawn in (
+                    ("time_s", column.content.time),
+                    ("frequency_Hz", column.content.ridge),
+                    ("value", column.content.ridge_magnitude),
+                ):
+                    np.testing.assert_allclose(ridge[named].astype(float), drawn, rtol=1e-6)
                 continue
             for chart in column.content:
                 for trace in chart.traces:
@@ -191,6 +198,7 @@ def test_the_table_holds_what_is_drawn(folder: Path) -> None:
                     values = points["low" if isinstance(trace, Band) else "value"].dropna()
                     shown = trace.low if isinstance(trace, Band) else trace.y
                     np.testing.assert_allclose(values, shown[np.isfinite(shown)], rtol=1e-6)
+                    np.testing.assert_allclose(points["time_s"].astype(float), trace.x, rtol=1e-6)
 
 
 def test_every_picture_says_where_it_is_from(folder: Path) -> None:
