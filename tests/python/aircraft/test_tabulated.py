@@ -13,6 +13,7 @@ from lever_sil.aircraft.tabulated import Tabulated
 from lever_sil.commands.aircraft import response
 from lever_sil.plants import lever_plant
 from python.aircraft.loops import decibels, loop_of, margins
+from python.conftest import Refused, Run
 from python.plants.motion import LEVER, TRIM, columns
 
 FREQUENCY = np.geomspace(1.0, 10.0, 60)
@@ -93,3 +94,16 @@ def test_frequencies_that_lack_the_crossing_are_refused(frequencies: tuple[float
     path.write_text(rows(*frequencies))
     with pytest.raises(LeverError, match=rf"from {frequencies[0]:g} to {frequencies[-1]:g} Hz; the margin .* needs it"):
         response(str(path), [])
+
+
+def test_a_table_that_does_not_fly_is_written_with_a_warning_and_is_no_state_space(
+    tmp_path: Path, lever: Run, refused: Refused
+) -> None:
+    path = tmp_path / "some.csv"
+    path.write_text(rows(1.8, 3.0, 5.0, 7.2))
+    status, _, said = lever("aircraft", path, "-o", tmp_path / "some.response")
+    assert (status, said.count("\n")) == (0, 1)
+    assert said.startswith("lever: warning: ")
+    assert "which does not fly" in said
+    assert "which does not fly" in refused("aircraft", path, "--export", tmp_path / "craft.csv")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["some.csv", "some.response"]

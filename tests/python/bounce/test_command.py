@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
 from lever_cdkf.cli.main import main
 from lever_sil.acceptance.result import Limit
-from lever_sil.bounce import bounce_page, conditions, run_conditions
+from lever_sil.bounce import bounce_page, conditions, measure, run_conditions
 from lever_sil.bounce.conditions import CONDITIONS, Condition
-from lever_sil.bounce.flights import FIVE
+from lever_sil.bounce.flights import FIVE, Plan
 from lever_sil.bounce.measure import FIGURES, Measured
 from python.conftest import Refused
 
@@ -33,6 +34,19 @@ def test_every_figure_is_one_that_is_known() -> None:
     for row in CONDITIONS.values():
         assert row.figures
         assert set(row.figures) <= set(FIGURES)
+
+
+@pytest.mark.parametrize("name", CONDITIONS)
+def test_the_flight_of_a_condition_can_be_flown(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is a scenario that is valid, also where only the whole table flies it."""
+
+    def fly(plan: Plan) -> NoReturn:
+        assert plan.scenario.aircraft is not None
+        raise InterruptedError
+
+    monkeypatch.setattr(measure, "fly", fly)
+    with pytest.raises(InterruptedError):
+        CONDITIONS[name].measure(CONDITIONS[name].aircraft[-1], 1)
 
 
 def test_results_are_of_all_aircraft_and_pilots(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,6 +15,7 @@ import pytest
 from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import Config
 from lever_sil.acceptance import table
+from lever_sil.acceptance.excerpt import Excerpt
 from lever_sil.acceptance.result import Limit
 from lever_sil.batch import firmware
 from lever_sil.batch.firmware import ClosedLoop
@@ -214,3 +215,15 @@ def test_a_table_of_its_own_runs_where_it_is_named(tmp_path: Path, named: Sequen
     main(["envelope", *only, "--seeds", "1", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")])
     rows = json.loads((tmp_path / "rows.json").read_text(encoding="utf-8"))["rows"]
     assert [row["name"] for row in rows] == ran
+
+
+def test_the_chart_of_a_flight_leaves_room_above_and_below_what_is_usual() -> None:
+    """A spike, and what the bare lever does without an arm, do not squeeze it."""
+    time = np.linspace(0.0, 10.0, 1001)
+    value, truth = np.where(time == 5.0, 90.0, 4.0 + 0.1 * time), np.where(time < 2.0, 1.0, 4.5)
+    shown = Excerpt("f_n", time, truth, value, 0.1 * value, time > 9.0).chart(2.0, [3.0]).spec()
+    assert shown["layout"]["yaxis"]["range"] == pytest.approx([0.85 * 4.0, 1.15 * 5.0], rel=0.01)
+    assert [trace["name"] for trace in shown["data"][-3:]] == ["truth", "estimate", "flagged"]
+    nothing = np.full(len(time), np.nan)
+    empty = Excerpt("f_n", time, np.empty(0), nothing, nothing, time < 0.0).chart(2.0, []).spec()
+    assert empty["layout"]["yaxis"]["range"] == [0.0, 1.0]
