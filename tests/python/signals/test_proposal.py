@@ -48,7 +48,7 @@ def short(flight: Flight) -> Flight:
 @pytest.mark.parametrize(("low", "high", "together"), [(2.0, 8.0, True), (10.0, 20.0, False)])
 def test_what_moves_with_the_base_does_so_where_a_lever_can(low: float, high: float, together: bool) -> None:
     """Two signals of noise that are the same in one band: from 2 to 8 Hz it counts, and what motors do above not."""
-    time, random = 0.01 * np.arange(6000), np.random.default_rng(1)
+    time, random = 0.01 * np.arange(6000.0), np.random.default_rng(1)
     frequency = np.fft.rfftfreq(len(time), 0.01)
     in_band = (frequency > low) & (frequency < high)
     spectra = np.fft.rfft(random.standard_normal((3, len(time))))

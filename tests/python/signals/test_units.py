@@ -7,6 +7,9 @@ import math
 import numpy as np
 import pytest
 from lever_cdkf.errors import LeverError
+from lever_cdkf.signals.inputs import understood
+from lever_cdkf.signals.mapping import Source
+from lever_cdkf.signals.recorded import Signal
 from lever_cdkf.signals.units import check_plausible, factor, gravity_in, guess
 
 
@@ -98,3 +101,26 @@ def test_more_than_a_hundredth_beyond_what_there_is_means_another_unit(key: str,
         check_plausible(key, "it", values)
     check_plausible(key, "it", np.full(1000, 0.99 * greatest))
     check_plausible(key, "it", np.full(3, np.nan))
+
+
+@pytest.mark.parametrize(
+    ("key", "unit", "size"),
+    [
+        ("theta", "rad", 0.5),
+        ("theta", "deg", math.degrees(0.5)),
+        ("theta_dot", "rad/s", 1.0),
+        ("theta_dot", "deg/s", math.degrees(1.0)),
+        ("z_ddot", "m/s^2", 9.81),
+        ("z_ddot", "g", 9.81 / 9.80665),
+        ("tau_m", "N m", 2.0),
+    ],
+)
+def test_a_signal_whose_unit_nobody_says_is_read_in_the_one_that_is_told(key: str, unit: str, size: float) -> None:
+    """The same values as with that unit, and a sentence that says so."""
+    time = 0.01 * np.arange(500.0)
+    values = size * (1.0 + 0.2 * np.sin(time))
+    taken, said = (understood(key, Source("x", unit=each), Signal("x", time, values)) for each in ("", unit))
+    assert taken.signal.unit == said.signal.unit
+    np.testing.assert_array_equal(taken.signal.values, said.signal.values)
+    (told,) = set(taken.notes) - set(said.notes)
+    assert told.startswith(f"{key} = x: no unit is said; taken as {unit}, since ")
