@@ -79,10 +79,12 @@ def failure(arguments: Sequence[str], environment: dict[str, str], timeout: floa
     """Return what pytest says about the first test that fails; nothing: all pass."""
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile("w+", encoding="utf-8") as output:
         options = ["-q", "--tb=line", "-p", "no:cacheprovider", "-p", "selection", f"--basetemp={folder}/t"]
+        rest = Path(folder, "arguments")  # files that are written say by which command: a long one would not be read
+        rest.write_text("\n".join(arguments))
         path = os.pathsep.join([str(HOOK), *filter(None, [os.environ.get("PYTHONPATH")])])
         whole = os.environ | environment | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
         with subprocess.Popen(
-            [sys.executable, "-m", "pytest", *options, *arguments], cwd=ROOT, env=whole,
+            [sys.executable, "-m", "pytest", *options, f"@{rest}"], cwd=ROOT, env=whole,
             stdout=output, stderr=output, stdin=subprocess.DEVNULL, start_new_session=True,
         ) as process:  # fmt: skip
             try:
