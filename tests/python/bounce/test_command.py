@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -14,8 +15,9 @@ from lever_sil.acceptance.result import Limit
 from lever_sil.bounce import bounce_page, conditions, measure, run_conditions
 from lever_sil.bounce.conditions import CONDITIONS, Condition
 from lever_sil.bounce.flights import FIVE, Plan
-from lever_sil.bounce.measure import FIGURES, Measured
+from lever_sil.bounce.measure import FIGURES, Excerpt, Measured
 from python.conftest import Refused
+from python.report.reading import Reader, figures, unpack
 
 
 def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -62,6 +64,29 @@ def test_results_are_of_all_aircraft_and_pilots(monkeypatch: pytest.MonkeyPatch)
     assert result.worst_run("alarm lead") == "uh60_like, pilot 0"
     assert "MISSED" in bounce_page.build([result], 2)
     assert np.isclose(result.of(row.limits[0]), 9.0)
+
+
+def test_the_page_shows_a_flight(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The margin with its band, up to 15 dB, the lever, the cabin, and lines when what came."""
+    time = np.linspace(0.0, 10.0, 101)
+    shown = Excerpt(time, time - 3.0, time + 6.0, np.full(101, 2.0), 0.1 * time, 0.2 * time, 0.3 * time, {"alarm": 4.0})
+    row = Condition("made_up", "title", lambda *_: Measured({"alarm lead": 1.0}, shown), aircraft=FIVE[:1])
+    monkeypatch.setattr(run_conditions, "CONDITIONS", {"made_up": row})
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
+    (result,) = run_conditions.run([replace(row, also=("alarm lead",))], 1, lambda *_: None)
+    (chart,) = figures(Reader(bounce_page.build([result], 1))).values()
+    low, high, truth, estimate, theta, correction, cabin = (unpack(trace["y"]) for trace in chart["data"])
+    for drawn, values in (
+        (estimate, np.minimum(time + 6.0, 15.0)),
+        (low, np.minimum(time + 6.0, 15.0) - 4.0),
+        (high, np.minimum(time + 10.0, 15.0)),
+        (truth, time - 3.0),
+        (theta, 0.1 * time),
+        (cabin, 0.2 * time),
+        (correction, 0.3 * time),
+    ):
+        np.testing.assert_allclose(drawn, values, rtol=1e-4, atol=1e-3)
+    assert [shape["x0"] for shape in chart["layout"]["shapes"] if shape["x0"] == shape["x1"]] == [4.0]
 
 
 def test_pilots_may_fly_the_aircraft_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -113,6 +113,7 @@ def test_the_firmware_dithers_the_lever_while_samples_are_lost(whole: bool) -> N
     assert missing == 0.0 if whole else 0.4 < missing < 0.6
     assert np.any(track.faults & fault_mask("GAP")) == whole
     assert np.all(np.diff(track.value["f_n"][200:], axis=0).any(axis=0))
+    assert track.feedthrough is None, "it is not noted in the loop"
 
 
 @pytest.mark.usefixtures("short")

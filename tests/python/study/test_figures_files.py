@@ -281,6 +281,12 @@ def test_the_page_holds_what_is_described(folder: Path) -> None:
             assert len(named) == len(set(named))
 
 
+def test_surfaces_in_print_have_their_axes_named() -> None:
+    first, second, *_ = printed.sheet(figure_of("bode")).axes
+    assert [first.get_ylabel(), second.get_ylabel()] == ["frequency [Hz]", ""]
+    assert {each.get_xlabel() for each in (first, second)} == {"time [s]"}
+
+
 def test_both_surfaces_have_one_scale(folder: Path) -> None:
     specs = figures(read(folder / "figures.html"))
     scales = [(spec["data"][0]["cmin"], spec["data"][0]["cmax"]) for key, spec in specs.items() if "bode" in key]
