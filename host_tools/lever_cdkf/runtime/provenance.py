@@ -10,6 +10,7 @@ import os
 import re
 import shlex
 import sys
+import textwrap
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime, timezone
@@ -22,6 +23,8 @@ from .files import native_file, shared_library
 
 SOFTWARE = "lever-cdkf"
 _DATE = "%Y-%m-%dT%H:%M:%SZ"
+_WRAPPED = textwrap.TextWrapper(120, subsequent_indent="  ", break_on_hyphens=False)
+"""No line of a settings file has more than 510 bytes, which is room for 120 characters of four bytes each."""
 
 
 @dataclass(frozen=True)
@@ -60,10 +63,11 @@ class Provenance:
         return json.dumps(self.content(), indent=2, ensure_ascii=False) + "\n"
 
     def comment(self) -> str:
-        """As lines that begin with #."""
+        """As lines that begin with #, short enough for every reader of settings and responses."""
         generator = f"{SOFTWARE} {self.version}{f' ({self.revision})' if self.revision else ''}, {self.created}"
         hashes = [f"{path} {digest or '(not a file)'}" for path, digest in self.inputs.items()]
-        return "".join(f"# {line}\n" for line in (generator, self.command, *hashes))
+        lines = (part for line in (generator, self.command, *hashes) for part in _WRAPPED.wrap(line))
+        return "".join(f"# {line}\n" for line in lines)
 
     def properties(self, **more: Any) -> dict[str, str]:
         """Return name and text of each property, for formats that keep pairs of text.

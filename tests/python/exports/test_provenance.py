@@ -17,6 +17,7 @@ import pytest
 from lever_cdkf.cli.main import main
 from lever_cdkf.commands.options import input_files
 from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.settings_file import read_assignments
 from lever_cdkf.runtime import provenance as origin
 from lever_cdkf.runtime.files import LIBRARY_DIR, native_file, shared_library
 from lever_cdkf.runtime.provenance import provenance, with_provenance
@@ -33,6 +34,17 @@ def test_the_date_is_now_or_that_of_the_environment(monkeypatch: pytest.MonkeyPa
         monkeypatch.setenv("SOURCE_DATE_EPOCH", wrong)
         with pytest.raises(LeverError, match="SOURCE_DATE_EPOCH"):
             provenance()
+
+
+def test_a_settings_file_that_a_long_command_has_written_can_be_read(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    words = ["/bin/lever", "tune", *(f"flight\N{MULTIPLICATION SIGN}{index}.log" for index in range(300)), "x" * 2000]
+    monkeypatch.setattr(sys, "argv", words)
+    path = tmp_path / "long.settings"
+    path.write_text(provenance().comment() + "theta_noise = 0.002\n", encoding="utf-8")
+    assert read_assignments(path) == {"theta_noise": pytest.approx(0.002)}
+    assert all(len(line) <= 510 for line in path.read_bytes().splitlines())
 
 
 def test_inputs_are_told_by_the_hash_of_their_bytes(tmp_path: Path) -> None:
