@@ -47,7 +47,9 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("log", metavar="LOG", help="a recorded log, or a file of columns")
     parser.add_argument("--dbc", metavar="FILE", help="database of the messages (DBC, ARXML, KCD, SYM)")
     parser.add_argument("--channel", metavar="NAME", help="the bus that is looked at (default: all)")
-    parser.add_argument("--time", metavar="COLUMN", help="the column of time of a file (default: by its name)")
+    parser.add_argument(
+        "--time", metavar="COLUMN", help="the column of time of a file, with its unit: t,unit=ms (default: by its name)"
+    )
     parser.add_argument("--toml", metavar="FILE", type=Path, help="write the proposal as a mapping file")
     parser.add_argument(
         "-o", "--out", metavar="FILE", type=Path, help="write plots of what changes: .html, .pdf, .svg, .png"
@@ -61,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     from ..cli.tables import print_tables
     from ..runtime.files import write_text
     from ..runtime.provenance import provenance
-    from ..signals.mapping import as_toml
+    from ..signals.mapping import as_toml, time_column
     from ..signals.plots import KINDS, write
     from ..signals.proposal import propose
     from ..signals.reading import all_signals
@@ -73,9 +75,11 @@ def run(args: argparse.Namespace) -> int:
         raise LeverError(f"cannot write {args.out}: plots are {', '.join(KINDS)}; --toml FILE writes the mapping")
     for path in (args.toml, args.out, args.json):
         check_not_input(path, read)
-    signals = all_signals(args.log, args.dbc, args.channel, args.time, start, length)
+    time = None if args.time is None else time_column(args.time)
+    signals = all_signals(args.log, args.dbc, args.channel, time, start, length)
     mapping, proposed, nearly = propose(signals, args.log)
-    mapping = replace(mapping, time=args.time)
+    if time is not None:
+        mapping = replace(mapping, time=time[0], time_unit=time[1])
     inputs = {each.signal.name: each.key for each in proposed}
     others = [signal for signal in signals if signal.name not in inputs]
     changing = [signal for signal in others if signal.changes()]
@@ -117,7 +121,7 @@ def _left_out(each: Candidate) -> str:
     name, unit = each.signal.name, each.signal.unit
     lacks = f"is in {unit}" if unit else "has no unit"
     given = "" if unit else f",unit={KINDS[each.key][1]}"
-    option = f"--map '{each.key}={name}{given}'"
+    option = f"`lever replay … --map '{each.key}={name}{given}'`"
     return f"{each.key} is not mapped: {name} {lacks}, and may be something else; {option} takes it"
 
 

@@ -24,8 +24,9 @@ Signals of other messages: --dbc FILE describes them, and --map says which is wh
   --map theta=LEVER.Angle z_ddot=IMU.AccZ tau_m=MOTOR.Torque
 The inputs are theta, theta_dot, z_ddot, tau_m and grip_force; z_ddot and one of theta and theta_dot are needed. In a
 file of columns (.csv, .parquet, .mat, .npz, .mf4 with signals) a column is mapped, without --dbc; time=COLUMN names the
-column of time, where it has another name. The unit is that of the database or the header; where there is none, it is
-guessed, and the guess is printed. Gravity is recognised and subtracted. To set these by hand, append to SIGNAL
+column of time, where it has another name; time=COLUMN,unit=ms says its unit, too. The unit is that of the database or
+the header; where there is none, it is guessed, and the guess is printed. Gravity is recognised and subtracted. To set
+these by hand, append to SIGNAL
 ,unit=deg ,factor=0.01 ,offset=-2 deg ,sign=-1 ,gravity=included (or none) ,delay=4 ms ,channel=can1 (in quotes, if it
 has a blank). Instead of KEY=SIGNAL, a .toml file may hold the same, and how messages are protected (E2E); `lever map`
 proposes one.

@@ -176,7 +176,9 @@ def _tables(summary: ReplaySummary) -> Tables:
     if summary.comparison is not None:
         tables["replayed minus recorded estimates"] = [*summary.comparison.rows()]
     if mapping := summary.recording.mapping:
-        tables["signals"] = [{"input": key, **vars(each)} for key, each in mapping.inputs.items()]
+        rows: list[Row] = [{"input": key, **vars(each)} for key, each in mapping.inputs.items()]
+        times: list[Row] = [{"input": "time", "signal": name, "unit": unit} for name, unit in mapping.times.items()]
+        tables["signals"] = [{**dict.fromkeys(rows[0]), **row} for row in (*times, *rows)]
     shares = {**summary.fault_shares, "any that warns": summary.flagged_share}
     tables["share of the judged time with each fault"] = [
         {"fault": name, "share [%]": None if share is None else 100.0 * share} for name, share in shares.items()

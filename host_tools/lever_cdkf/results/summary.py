@@ -270,6 +270,8 @@ class Mapped:
     """How samples were made of a log that does not speak lever.dbc."""
 
     inputs: dict[str, MappedSignal]
+    times: dict[str, str]
+    """Unit of each column of time, of a file; empty for dates."""
     clock: str
     sample_period_s: float
     disordered_values: int

@@ -69,15 +69,15 @@ def signals_by_input(columns: Columns, units: Mapping[str, str]) -> dict[str, Si
 
 def _time(columns: Columns, units: Mapping[str, str]) -> tuple[str, FloatArray]:
     """Return the name of the column of time, and it in seconds. Raise LeverError."""
-    name = find_time(columns, "samples")
+    name = find_time(columns, "samples", say="names={'time': 'column'} says which")
     values, own = columns[name]
     unit = units.get("time", own)
+    time = seconds(values, unit or "s", f"samples: {name}")
     if values.dtype.kind in "iuf" and not unit and time_scale(values) != 1.0:
         likely = {1e-3: "ms", 1e-6: "us", 1e-9: "ns"}[time_scale(values)]
         step = float(np.median(np.diff(values)))
         hint = f"units={{'time': '{likely}'}} says so"
         raise LeverError(f"{name} goes on by {step:.3g} a sample: it looks like {likely}: {hint}")
-    time = seconds(values, unit or "s", f"samples: {name}")
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1e-3
     if not 5e-5 < step < 0.5:
         hint = "units={'time': …} says what it is in: s, ms, us or ns"

@@ -3,6 +3,7 @@
     theta=LEVER_POSITION.Angle                              what the database or the header says, gravity by its looks
     z_ddot=IMU.AccZ,unit=g,sign=-1,gravity=included         said by hand
     theta=Angle,factor=0.0017,offset=-2 deg,channel=can1,delay=4 ms
+    time=Stamp,unit=ms                                      the column of time of a file
 
 or the same as TOML, a table for each input, and one for each message with E2E protection:
 
@@ -76,6 +77,8 @@ class Mapping:
     protected: dict[str, Protection] = field(default_factory=dict)
     time: str | None = None
     """The column with the time, of a file without a bus; by default found by its name."""
+    time_unit: str = ""
+    """Of that column; empty: what the header says, else by its steps."""
 
     def __post_init__(self) -> None:
         if "theta" not in self.sources and "theta_dot" not in self.sources:
@@ -93,7 +96,7 @@ def read_mapping(entries: Iterable[str]) -> Mapping:
     """
     sources: dict[str, Source] = {}
     protected: dict[str, Protection] = {}
-    time: str | None = None
+    time: tuple[str, str] | None = None
     for entry in entries:
         if "=" not in entry or (entry.lower().endswith(".toml") and Path(entry).is_file()):
             content = _toml(entry)
@@ -106,15 +109,25 @@ def read_mapping(entries: Iterable[str]) -> Mapping:
             continue
         key, _, text = entry.partition("=")
         if key.strip() == "time":
-            time = text.strip()
+            time = time_column(text)
         else:
             sources[_key(key)] = _source(key, _assignments(key, text))
-    return Mapping(sources, protected, time)
+    return Mapping(sources, protected, *(time or ()))
+
+
+def time_column(text: str) -> tuple[str, str]:
+    """Return name and unit of a column of time, COLUMN[,unit=UNIT]; the unit is empty without one. Raise LeverError."""
+    found = _time(_assignments("time", text))
+    assert found is not None
+    return found
 
 
 def as_toml(mapping: Mapping) -> str:
     """Return the text of a mapping file."""
-    lines: list[str] = [] if mapping.time is None else ["[time]", f"signal = {_quoted(mapping.time)}", ""]
+    lines: list[str] = []
+    if mapping.time is not None:
+        unit = [f"unit = {_quoted(mapping.time_unit)}"] if mapping.time_unit else []
+        lines = ["[time]", f"signal = {_quoted(mapping.time)}", *unit, ""]
     for key, source in mapping.sources.items():
         lines += [f"[{key}]", f"signal = {_quoted(source.signal)}"]
         for each in fields(Source)[1:]:
@@ -151,11 +164,19 @@ def _toml(path: str) -> dict[str, Any]:
         raise LeverError(f"{path}: {error}") from None
 
 
-def _time(table: Any) -> str | None:
-    name = table.get("signal") if isinstance(table, dict) else table
-    if name is not None and not isinstance(name, str):
+def _time(table: Any) -> tuple[str, str] | None:
+    """Return column and unit of a mapping's time."""
+    if table is None:
+        return None
+    table = table if isinstance(table, dict) else {"signal": table}
+    name, unit = table.get("signal"), table.get("unit", "")
+    if not isinstance(name, str) or not isinstance(unit, str):
         raise LeverError('mapping of time: it needs a column, as in time = "t"')
-    return name
+    if unknown := sorted(set(table) - {"signal", "unit"}):
+        raise LeverError(f"mapping of time: it may have a unit, and not {', '.join(unknown)}")
+    if unit and factor("time", unit) is None:
+        raise LeverError(f"mapping of time: {unit} is no unit of time known here: s, ms, us, ns")
+    return name, unit
 
 
 def _key(key: str) -> str:

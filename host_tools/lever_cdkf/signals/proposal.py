@@ -124,7 +124,9 @@ def propose(signals: Sequence[Signal], where: str) -> tuple[Mapping, list[Candid
             nearly.append(best[0])
     if "z_ddot" not in chosen or not chosen.keys() & {"theta", "theta_dot"}:
         lacking = "an acceleration of the base" if chosen.keys() & {"theta", "theta_dot"} else "the angle of a lever"
-        raise LeverError(f"{where}: no signal looks like {lacking}: map it by hand, with --map KEY=SIGNAL")
+        raise LeverError(
+            f"{where}: no signal looks like {lacking}: map it by hand, with `lever replay --map KEY=SIGNAL`"
+        )
     proposed = [chosen[key] for key in INPUTS if key in chosen]
     units = {each.key: _unit(each, chosen) for each in proposed}
     sources = {each.key: _source(each, chosen, units[each.key][0]) for each in proposed}

@@ -72,11 +72,14 @@ class Loaded:
     """By mapped message."""
     unprotected: int = 0
     """Frames of mapped messages without E2E protection in the mapping."""
+    times: dict[str, str] = field(default_factory=dict)
+    """Of a file: unit of each column of time."""
 
     def summary(self) -> Mapped:
         """Return what summary.json says of it."""
         return Mapped(
             inputs={key: each.summary(self.samples, key) for key, each in self.inputs.items()},
+            times=self.times,
             clock=self.samples.clock,
             sample_period_s=self.samples.period,
             disordered_values=self.samples.disordered,
@@ -129,7 +132,7 @@ def _of_bus(paths: list[str], reading: Reading, mapping: Mapping, file: str, pro
 
 def _of_table(path: str, reading: Reading) -> Loaded:
     mapping = reading.mapping
-    columns = read_table(path, None if mapping is None else mapping.time)
+    columns = read_table(path, *(() if mapping is None else (mapping.time, mapping.time_unit)))
     mapping = mapping or mapping_by_name(columns, path)
     start = _beginning(columns) + reading.start
     inputs = {}
@@ -138,18 +141,23 @@ def _of_table(path: str, reading: Reading) -> Loaded:
         _check_part(len(signal.time), reading.start, path)
         inputs[key] = understood(key, source, signal)
     samples, notes = recorded_samples(inputs, reading.clock)
-    of_file = notes_of(each.signal for each in inputs.values())
+    used = [each.signal for each in inputs.values()]
+    of_file = notes_of(used)
     rows = max(len(each.signal.time) for each in inputs.values())
-    return Loaded(samples, inputs, [*of_file, *notes], Table([path]), [], rows, 0)
+    times = {each.time_column: each.time_unit for each in used if each.time_column}
+    return Loaded(samples, inputs, [*of_file, *notes], Table([path]), [], rows, 0, times=times)
 
 
 def all_signals(
-    log: str, database: str | None, channel: str | None, time: str | None, start: float, length: float
+    log: str, database: str | None, channel: str | None, time: tuple[str, str] | None, start: float, length: float
 ) -> list[Signal]:
-    """Return every signal of a log or file, in a part of it. Raise LeverError."""
+    """Return every signal of a log or file, in a part of it. Raise LeverError.
+
+    `time` is the column of time of a file, and its unit.
+    """
     _check_there(log)
     if is_table(log):
-        signals = read_table(log, time)
+        signals = read_table(log, *(time or ()))
         first = _beginning(signals) + start
         return [each.between(first, first + length) for each in signals]
     if database is None:

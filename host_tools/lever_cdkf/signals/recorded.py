@@ -24,6 +24,10 @@ class Signal:
     """As it is written there; empty without one."""
     words: str = ""
     """What the database says of it."""
+    time_column: str = ""
+    """Of a file of columns: the one with its times."""
+    time_unit: str = ""
+    """In which that column is, as it was said or taken; empty for dates."""
     notes: tuple[str, ...] = ()
     """What its reader had to decide, a sentence each, for the user to see."""
 

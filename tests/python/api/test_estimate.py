@@ -128,6 +128,14 @@ def test_what_is_noticed(change: dict[str, Callable[[Any], Any]], said: str, col
         estimate(changed)
 
 
+@pytest.mark.parametrize("unit", ["s", "ms"])
+def test_rows_that_are_not_in_order_of_time_say_so_first(unit: str, columns: Columns) -> None:
+    backwards = {name: values[::-1] for name, values in columns.items()}
+    backwards["time"] = backwards["time"] * {"s": 1.0, "ms": 1e3}[unit]
+    with pytest.raises(LeverError, match="time goes back in 19,999 of 20,000 rows: sort by time"):
+        estimate(backwards)
+
+
 @pytest.mark.parametrize(
     ("samples", "options", "said"),
     [

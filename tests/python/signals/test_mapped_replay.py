@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -158,6 +159,34 @@ def test_at_other_rates(step: int, flight: Flight, tmp_path: Path) -> None:
     summary = replayed(tmp_path / "out", tmp_path / "slow.csv")
     assert summary["estimator"]["settings"]["sample_period"] == pytest.approx(step * 2e-3)
     assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+
+
+def test_a_guessed_unit_of_time_is_said_and_can_be_given(flight: Flight, tmp_path: Path, refused: Refused) -> None:
+    """Numbers of samples are taken as ms; the user who knows better says so, in words or in a mapping file."""
+    log, mapped = tmp_path / "log.csv", ("theta=theta", "z_ddot=z_ddot")
+    numbers = np.arange(len(flight.time))
+    columns = np.column_stack((numbers, flight.theta, flight.z_ddot + GRAVITY))
+    np.savetxt(log, columns, "%.7f", ",", header="time,theta,z_ddot", comments="")
+    summary = replayed(tmp_path / "out", log, "--map", *mapped)
+    assert "time has no unit: taken as ms (1000 Hz)." in summary["verdict"]
+    assert summary["recording"]["mapping"]["times"] == {"time": "ms"}
+    assert "every 1000 ms (1 Hz)" in refused("replay", log, "--map", *mapped, "time=time,unit=s")
+    assert "furlong is no unit of time" in refused("replay", log, "--map", *mapped, "time=time,unit=furlong")
+    (tmp_path / "time.toml").write_text('[time]\nsignal = "time"\nunit = "ms"\n')
+    summary = replayed(tmp_path / "out", log, "--map", *mapped, tmp_path / "time.toml")
+    assert "no unit: taken as ms" not in summary["verdict"]
+
+
+@pytest.mark.parametrize("order", ["reversed", "shuffled"])
+def test_rows_that_are_not_in_order_of_time_are_refused(
+    order: str, flight: Flight, tmp_path: Path, refused: Refused
+) -> None:
+    places = np.arange(len(flight.time))[::-1]
+    places = np.random.default_rng(1).permutation(places) if order == "shuffled" else places
+    log = tmp_path / "log.npz"
+    np.savez(log, time_s=flight.time[places], theta=flight.theta[places], z_ddot=flight.z_ddot[places])
+    said = refused("replay", log, "--map", "theta=theta,unit=rad", "z_ddot=z_ddot,unit=m/s^2")
+    assert re.search(r"time_s goes back in [\d,]+ of 1[\d,]+ rows: sort by time", said)
 
 
 def test_too_slow_is_refused(flight: Flight, tmp_path: Path, refused: Refused) -> None:
