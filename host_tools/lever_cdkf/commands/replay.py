@@ -129,7 +129,7 @@ def _run_each(args: argparse.Namespace) -> int:
     for each in replays:
         if each.problem:
             print(f"lever: replay: {each.log}: {each.problem.removeprefix(f'{each.log}: ')}", file=sys.stderr)
-    return 1 if any(each.problem for each in replays) else 0
+    return 1 if any(each.failed for each in replays) else 0
 
 
 def _options(args: argparse.Namespace, log: str, formats: Sequence[str]) -> Options:
@@ -180,7 +180,8 @@ def _tables(summary: ReplaySummary) -> Tables:
         times: list[Row] = [{"input": "time", "signal": name, "unit": unit} for name, unit in mapping.times.items()]
         tables["signals"] = [{**dict.fromkeys(rows[0]), **row} for row in (*times, *rows)]
     shares = {**summary.fault_shares, "any that warns": summary.flagged_share}
-    tables["share of the judged time with each fault"] = [
+    judged = "time" if summary.flagged_share is None else "judged time"
+    tables[f"share of the {judged} with each fault"] = [
         {"fault": name, "share [%]": None if share is None else 100.0 * share} for name, share in shares.items()
     ]
     return tables | {"recording": [_recording_row(summary)]}

@@ -23,7 +23,7 @@ from ..runtime.extras import missing, require
 from ..runtime.files import Outputs
 from ..runtime.provenance import Provenance, provenance, with_provenance
 from .engine import Options, Progress, replay
-from .summary import failure
+from .summary import failure, incomplete
 
 PAGE = "overlay.html"
 TABLE = "logs.parquet"
@@ -36,10 +36,14 @@ class Replayed:
     """One of the logs."""
 
     log: str
+    name: str
+    """Shown: the end of its path that no other log has."""
     summary: ReplaySummary | None = None
     """None where it could not be replayed."""
     problem: str = ""
     """Why not, or why it is not to be believed."""
+    failed: bool = False
+    """Whether the problem is more than a log that is cut off."""
     rows: Mapping[str, FloatArray] = field(default_factory=dict)
     """Of its trace, reduced."""
 
@@ -50,9 +54,9 @@ class Replayed:
     def row(self) -> Row:
         """Return what the table says of it."""
         if self.summary is None:
-            return {"log": Path(self.log).name, "problem": self.problem}
+            return {"log": self.name, "problem": self.problem}
         row: dict[str, Any] = {
-            "log": Path(self.log).name,
+            "log": self.name,
             "duration [s]": self.summary.recording.duration_s,
             "samples": self.summary.samples,
         }
@@ -70,13 +74,14 @@ def replay_each(
     What is wrong with a log is its row's `problem`, and the others go on.
     """
     replays = []
-    for log, folder in zip(logs, _folders(logs), strict=True):
-        each = Replayed(log)
+    for log, name, folder in zip(logs, _names(logs), _folders(logs), strict=True):
+        each = Replayed(log, name)
         try:
             each.summary = replay([log], options_of(log), None if out is None else out / folder, progress, each.keep)
-            each.problem = failure(each.summary)
+            failed = failure(each.summary)
+            each.failed, each.problem = bool(failed), failed or incomplete(each.summary.recording)
         except LeverError as error:
-            each.problem = " ".join(str(error).split())
+            each.failed, each.problem = True, " ".join(str(error).split())
         replays.append(each)
     return replays
 
@@ -103,6 +108,20 @@ def write(replays: Sequence[Replayed], out: Path, inputs: Sequence[str]) -> list
             _write_table(rows_of(replays), outputs.path(TABLE), origin)
         outputs.finish()
     return names
+
+
+def _names(logs: Sequence[str]) -> list[str]:
+    """Return for each the shortest end of its path that no other has."""
+    paths = [Path(log).parts for log in logs]
+
+    def name(index: int) -> str:
+        own, others = paths[index], paths[:index] + paths[index + 1 :]
+        for count in range(1, len(own)):
+            if all(other[-count:] != own[-count:] for other in others):
+                return str(Path(*own[-count:]))
+        return logs[index]
+
+    return [name(index) for index in range(len(paths))]
 
 
 def _folders(logs: Sequence[str]) -> list[str]:
@@ -134,24 +153,25 @@ def _page(replays: Sequence[Replayed]) -> str:
     page = Page(f"{len(replays)} logs", "The same firmware on each of them.", "lever replay --each")
     caption = "The estimates of all logs over the time since the start of each."
     page.section("estimates", "Estimates", "Estimates", page.figure("overlay", _figure(replays), caption))
-    rows = [_cells({**row, "log": name}) for row, name in zip(rows_of(replays), _labels(replays), strict=True)]
-    numbers = table([html.escape(name) for name in rows[0]], (list(row.values()) for row in rows))
+    rows = [_cells(row) for row in rows_of(replays)]
+    numbers = table([_heading(name) for name in rows[0]], (list(row.values()) for row in rows))
     page.section("numbers", "At the end", "At the end of each", numbers)
-    failed = sum(bool(each.problem) for each in replays)
-    return page.html(f'<p class="verdict bad">{failed} of {len(replays)} logs have a problem.</p>' if failed else "")
+    count = sum(bool(each.problem) for each in replays)
+    have = "has" if count == 1 else "have"
+    return page.html(f'<p class="verdict bad">{count} of {len(replays)} logs {have} a problem.</p>' if count else "")
 
 
-def _labels(replays: Sequence[Replayed]) -> list[str]:
-    """Return the names of the logs, with their folders where the names alone are the same."""
-    names = [Path(each.log).name for each in replays]
-    return [name if names.count(name) == 1 else each.log for name, each in zip(names, replays, strict=True)]
+def _heading(name: str) -> str:
+    return f'<span class="words">{name}</span>' if name == "problem" else html.escape(name)
 
 
 def _cells(row: Row) -> dict[str, str]:
     """As HTML; an estimate and its standard deviation are one."""
     cells: dict[str, str] = {}
     for name, cell in row.items():
-        if " sigma" not in name:
+        if name == "problem":  # prose, which is wrapped
+            cells[name] = f'<span class="words">{html.escape(str(cell or ""))}</span>'
+        elif " sigma" not in name:
             cells[name] = "" if cell is None else html.escape(number(cell, 4))
         elif cell is not None:
             cells[name.replace(" sigma", "")] += f" ± {number(cell, 2)}"
@@ -170,10 +190,10 @@ def _figure(replays: Sequence[Replayed]) -> Figure | None:
     rows = [axis(f"{each.symbol} [{each.shown_unit}]") for each in wanted]
     end = max(float(log.rows["time_s"][-1]) for log in shown)
     figure = Figure(rows, time_axis(end), 60 + _ROW_HEIGHT * len(rows))
-    for index, (log, name) in enumerate(zip(shown, _labels(shown), strict=True)):
+    for index, log in enumerate(shown):
         time = np.asarray(log.rows["time_s"])
         chosen = spread_indices(len(time), _POINTS)
         for row, quantity in enumerate(wanted):
             if (values := log.rows.get(quantity.column("estimate"))) is not None:
-                figure.add(line(time[chosen], values[chosen], name, SERIES[index % len(SERIES)], row))
+                figure.add(line(time[chosen], values[chosen], log.name, SERIES[index % len(SERIES)], row))
     return figure

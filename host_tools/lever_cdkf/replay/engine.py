@@ -227,7 +227,7 @@ class _Replay:
             passed=False,
             verdict="",
             recording=self._recording(),
-            fault_shares=figures.faults.shares,
+            fault_shares=figures.fault_shares(),
             flagged_share=figures.faults.warned_share,
             estimates=figures.estimates(),
             comparison=None if self._comparison is None else self._comparison.summary(),

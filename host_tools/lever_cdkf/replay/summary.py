@@ -30,7 +30,7 @@ class Figures:
         self._average_s = size * self._period
         self._modes: dict[int, int] = {}
         self.bounce = Bounce(self._period)
-        self.faults = FaultCounts()
+        self.faults, self._early = FaultCounts(), FaultCounts()
         self._measured: set[str] = set()
         self._last: dict[str, float] = {}
         self._extremes: dict[str, tuple[float, float]] = {}
@@ -49,7 +49,9 @@ class Figures:
             self._modes[int(mode)] = self._modes.get(int(mode), 0) + count
         columns = {key: column for column, _, key in MEASURED}
         self._measured |= {fault for fault, key in OPTIONAL.items() if np.isfinite(trace[columns[key]]).any()}
-        self.faults.add(trace["faults"][judged], tuple(OPTIONAL.keys() - self._measured))
+        without = tuple(OPTIONAL.keys() - self._measured)
+        self.faults.add(trace["faults"][judged], without)
+        self._early.add(trace["faults"][~judged], without)
         for name in (each.column(kind) for each in self._quantities for kind in ("estimate", "sigma")):
             finite = trace[name][np.isfinite(trace[name])]
             if len(finite):
@@ -70,6 +72,10 @@ class Figures:
                 greatest=greatest,
             )
         return by_key
+
+    def fault_shares(self) -> dict[str, float]:
+        """Return the shares of the judged time with each fault; of all time where none is judged."""
+        return self.faults.shares if self.faults.samples else self._early.shares
 
     def modes_s(self) -> dict[str, float]:
         """Return seconds in each mode."""
@@ -97,6 +103,11 @@ def failure(summary: ReplaySummary) -> str:
     return " and ".join(reasons)
 
 
+def incomplete(recording: RecordingSummary) -> str:
+    """Return that the log is cut off, and where; empty when it is whole."""
+    return f"The log is incomplete: {'; '.join(recording.ends_early)}." if recording.ends_early else ""
+
+
 def verdict(summary: ReplaySummary) -> str:
     """Return the replay in a few sentences."""
     sentences = [
@@ -104,6 +115,7 @@ def verdict(summary: ReplaySummary) -> str:
         summary.warning,
         *_troubles(summary),
         proof.in_words(summary.snapshots),
+        _too_short(summary),
         *_time_estimated(summary),
         bounce.verdict(summary.stability),
         summary.comparison.in_words if summary.comparison else "",
@@ -118,6 +130,14 @@ def warning(summary: ReplaySummary, tune_command: str) -> str:
     said = trust.warning(summary.fault_shares, summary.flagged_share)
     step = trust.next_step(summary.fault_shares, tune_command)
     return f"{said} Next: {step}." if said and step else said
+
+
+def _too_short(summary: ReplaySummary) -> str:
+    """Return that nothing is judged, where the log ends before that begins."""
+    duration = summary.recording.duration_s
+    if summary.flagged_share is not None or not duration < CONVERGED_AFTER or failure(summary):
+        return ""
+    return f"Too short to judge: {duration:.3g} s of estimates, {CONVERGED_AFTER:g} s are needed."
 
 
 def _time_estimated(summary: ReplaySummary) -> list[str]:
@@ -143,7 +163,7 @@ def _troubles(summary: ReplaySummary) -> list[str]:
         why = why_refused(summary.corrupt, summary.late)
         troubles.append(f"{recording.refused:,} frames were refused{f': {why}' if why else ''}.")
     if recording.ends_early:
-        troubles.append(f"The log is incomplete: {'; '.join(recording.ends_early)}.")
+        troubles.append(incomplete(recording))
     if recording.damaged_lines:
         troubles.append(f"{recording.damaged_lines} of its lines are not frames.")
     if recording.gaps:

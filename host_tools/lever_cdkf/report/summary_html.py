@@ -269,10 +269,12 @@ def run_table(run: Run) -> str:
     ]
     rows += [(label, number(getattr(run.summary, key, None)), unit) for key, label, unit in RUN_FIGURES]
     shares: dict[str, float | None] = {}
+    time = "judged time"
     if run.summary:
         shares = {**run.summary.fault_shares, "any that warns": run.summary.flagged_share}
+        time = "time" if run.summary.flagged_share is None else time
     rows += [
-        (f"of the judged time with fault: {html.escape(name)}", number(None if share is None else 100.0 * share), "%")
+        (f"of the {time} with fault: {html.escape(name)}", number(None if share is None else 100.0 * share), "%")
         for name, share in shares.items()
     ]
     return table(("", "value", "unit"), [row for row in rows if row[1] != NOTHING])

@@ -73,7 +73,10 @@ class Summary:
     modes_s: dict[str, float]
     """Seconds in each mode."""
     fault_shares: dict[str, float]
-    """Shares (0 to 1) of the judged time with each fault that there was; without those of inputs that a log lacks."""
+    """Shares (0 to 1) of the judged time with each fault that there was; without those of inputs that a log lacks.
+
+    Of a replay: of all time where flagged_share is None.
+    """
     flagged_share: float | None
     """Of the judged time with any of DO_NOT_TRUST of those; None where nothing is judged."""
     passed: bool
