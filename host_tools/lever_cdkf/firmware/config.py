@@ -69,6 +69,8 @@ def settings_table() -> tuple[Setting, ...]:
 def setting(name: str) -> Setting:
     """Return the row of a setting. Raise SettingsError, with the nearest name there is."""
     rows = {row.name: row for row in settings_table()}
+    if not isinstance(name, str):
+        raise SettingsError(f"{name!r} is no name of a setting; `lever settings` lists them all")
     if name not in rows:
         raise SettingsError(f"unknown setting {name!r}; {did_you_mean(name, rows, '`lever settings` lists them all')}")
     return rows[name]
@@ -160,6 +162,8 @@ class Config:
         for what, name in zip(CHOICES, (model, preload, estimator, adaptation, mitigation), strict=True):
             if name is not None:
                 setattr(self.pointer, what, choice_value(f"lever_{what}", what, name))
+        if not isinstance(settings, Mapping | None):
+            raise SettingsError(f"settings = {settings!r}: give values by name, as {{'k_p_walk': 0.1}}")
         for name, value in (settings or {}).items():
             setting(name).check(value)
             setattr(self.pointer.settings, name, value)
@@ -182,3 +186,10 @@ class Config:
     def settings_crc(self) -> int:
         """The CRC-32 over the settings, by which an estimator tells in IDENTITY which ones it has."""
         return int(lib.lever_settings_crc(ffi.addressof(self.pointer, "settings")))
+
+
+def given(config: Config | None) -> Config:
+    """Return `config`, or the defaults. Raise SettingsError for what is none."""
+    if not isinstance(config, Config | None):
+        raise SettingsError(f"config is a {type(config).__name__}: give a Config, as Config(model='lever')")
+    return config or Config()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import LeverError
 from .aircraft import AircraftResponse, Correction, Stability
-from .config import CHOICES, Config, choice_value
+from .config import CHOICES, Config, choice_value, given
 from .library import enum_names, ffi, lib, load, struct_dtype
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ class Estimator:
 
     def __init__(self, config: Config | None = None) -> None:
         self._memory = ffi.new("lever_memory_t *")  # holds the instance: both must live as long as this object
-        self._config = config or Config()
+        self._config = given(config)
         self.pointer: Any = lib.lever_init(self._memory, self._config.pointer)
         """For calls of `lib`; valid as long as this object."""
         if self.pointer == ffi.NULL:
@@ -496,7 +496,7 @@ def run_samples(
 
     from .samples import sample_array
 
-    config = config or Config()
+    config = given(config)
     estimator = Estimator(config)
     taken = sample_array(samples, config.settings["sample_period"])
     count = len(taken)

@@ -49,6 +49,11 @@ def sample_array(samples: Mapping[str, Any], period: float) -> NDArray[Any]:
     for name in (name for name in columns if f"{name}_valid" in fields):
         taken[name] = columns[name]
         taken[f"{name}_valid"] = columns.get(f"{name}_valid", ~np.isnan(columns[name]))
+        infinite = np.flatnonzero(taken[f"{name}_valid"] & np.isinf(columns[name]))
+        if len(infinite):
+            raise LeverError(
+                f"samples: {name} is {columns[name][infinite[0]]:g} at index {infinite[0]}: NaN is missing"
+            )
     for name, (greatest, unit) in _GREATEST.items():
         _check_angle(name, taken[name][taken[f"{name}_valid"]], greatest, unit)
     _check_slope(taken, columns["time_us"], period)

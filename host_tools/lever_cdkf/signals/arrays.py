@@ -40,8 +40,8 @@ def columns_of(data: Any) -> Columns:
     columns: Columns = {}
     for name, each in raw.items():
         values = each.to_numpy() if hasattr(each, "to_numpy") else np.asarray(each)
-        if values.dtype == object and hasattr(each, "tz_convert"):  # pandas' dates with a time zone
-            values = each.tz_convert(None).to_numpy()
+        if hasattr(getattr(each, "dtype", None), "tz"):  # pandas' dates with a time zone
+            values = getattr(each, "dt", each).tz_convert(None).to_numpy()
         if values.ndim == 1:
             attributes = getattr(each, "attrs", None) or {}
             columns[name] = (values, str(attributes.get("units", "")) or split_name(name)[1])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import LeverError
-from ..firmware.config import Config
+from ..firmware.config import Config, given
 from ..firmware.estimator import run_samples
 from ..numeric.derivative import in_degrees
 from .arrays import columns_of, signals_by_input
@@ -54,6 +54,10 @@ def estimate(
     LeverError
         An input is missing, or plainly in another unit than is said, or than SI where none is said; it is named.
     """
+    config = given(config)
+    for option, value in (("units", units), ("names", names)):
+        if not isinstance(value, Mapping | None):
+            raise LeverError(f"{option} = {value!r}: give them by input, as {{'theta': …}}")
     columns = columns_of(samples)
     for key, name in (names or {}).items():
         if key not in KINDS or name not in columns:
@@ -69,7 +73,7 @@ def estimate(
     _check_units(signals)
     sources = {key: Source(signal.name, signal.unit or KINDS[key][1]) for key, signal in signals.items()}
     taken, notes = recorded_samples({key: understood(key, sources[key], signal) for key, signal in signals.items()})
-    config = at_period(config or Config(), taken.period)
+    config = at_period(config, taken.period)
     return Result(config, taken.time_us, run_samples(config, taken.arrays()), tuple(notes))
 
 

@@ -193,10 +193,10 @@ class Result(Mapping[str, Estimated]):
         from . import result_plot
 
         kind = None if path is None else Path(path).suffix.lower().removeprefix(".")
-        if width not in pictures.WIDTHS or (kind is not None and kind not in pictures.KINDS):
-            raise LeverError(
-                f"cannot plot {width} {path}: it may be single or double, and .{', .'.join(pictures.KINDS)}"
-            )
+        if width not in pictures.WIDTHS:
+            raise LeverError(f"cannot plot with width = {width!r}: it may be {' or '.join(pictures.WIDTHS)}")
+        if kind is not None and kind not in pictures.KINDS:
+            raise LeverError(f"cannot write {path}: a plot may be .{', .'.join(pictures.KINDS)}")
         at = slice(None, None, max(1, len(self.time) // _MOST_POINTS))
         shown = {
             name: Estimated(name, each.unit, each.values[at], each.sigma[at])

@@ -96,6 +96,8 @@ def simulate(
         The estimator does not answer or refuses a COMMAND, the motion grows beyond all bounds, or a file cannot be
         written.
     """
+    if not isinstance(scenario, Scenario):
+        raise LeverError(f"scenario is a {type(scenario).__name__}: give what load_scenario({scenario!r}) returns")
     start = clock.perf_counter()
     if out_dir is not None:
         make_folder(out_dir)  # before a run that could then not be kept

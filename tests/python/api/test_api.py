@@ -47,6 +47,11 @@ def test_what_is_no_scenario(root: Path) -> None:
     assert lever_cdkf.load_scenario(root / "sil" / "lever_sil" / "scenarios" / "steady.toml").title
 
 
+def test_a_name_is_no_scenario_yet() -> None:
+    with pytest.raises(LeverError, match=r"scenario is a str: give what load_scenario\('steady'\) returns"):
+        lever_cdkf.simulate("steady")  # type: ignore[arg-type]
+
+
 def test_a_scenario_runs_without_a_bus() -> None:
     from lever_cdkf import load_scenario, simulate
 

@@ -52,6 +52,9 @@ FRAMES: dict[str, Callable[[Columns], Any]] = {
         .set_index(pd.Timestamp("2024-05-01T10:00:00Z") + pd.to_timedelta(columns["time"], unit="s"))
         .drop(columns="time")
     ),
+    "pandas with a column of dates": lambda columns: pd.DataFrame(columns).assign(
+        time=pd.Timestamp("2024-05-01T10:00:00Z") + pd.to_timedelta(columns["time"], unit="s")
+    ),
     "polars": pl.DataFrame,
     "xarray": with_units,
     "microseconds": lambda columns: {
@@ -151,6 +154,24 @@ def test_what_is_refused(samples: Any, options: Any, said: str) -> None:
         estimate(samples, **options)
 
 
+def test_what_is_of_another_kind_is_refused_in_words(columns: Columns) -> None:
+    frame = pd.DataFrame(columns)
+    for options, said in (
+        ({"config": "lever"}, "config is a str: give a Config"),
+        ({"units": 5}, "units = 5: give them by input"),
+        ({"names": "theta"}, "names = 'theta': give them by input"),
+    ):
+        with pytest.raises(LeverError, match=said):
+            estimate(frame, **options)  # type: ignore[arg-type]
+    for text in (frame.astype(str), frame.astype(object), frame.astype("string")):
+        with pytest.raises(LeverError, match="time is no column of numbers"):
+            estimate(text)
+    with pytest.raises(LeverError, match="settings = 5: give values by name"):
+        Config(settings=5)  # type: ignore[arg-type]
+    with pytest.raises(LeverError, match="config is a str: give a Config"):
+        run_samples("lever", {})  # type: ignore[arg-type]
+
+
 def test_other_names_and_settings(columns: Columns) -> None:
     renamed = {"Zeit": columns["time"], "winkel": columns["theta"], "nz": columns["z_ddot"]}
     names = {"theta": "winkel", "z_ddot": "nz"}
@@ -216,7 +237,9 @@ def test_the_plot_is_kept_with_its_numbers(kind: str, result: Result, tmp_path: 
 
 
 def test_a_plot_that_cannot_be_kept_is_an_error(result: Result, tmp_path: Path) -> None:
-    with pytest.raises(LeverError, match=r"it may be single or double, and \.png, \.svg, \.pdf"):
+    with pytest.raises(LeverError, match="cannot plot with width = 'wide': it may be single or double"):
+        result.plot(tmp_path / "estimates.pdf", width="wide")
+    with pytest.raises(LeverError, match=r"estimates\.gif: a plot may be \.png, \.svg, \.pdf"):
         result.plot(tmp_path / "estimates.gif")
     with pytest.raises(LeverError, match="cannot write"):
         result.plot(tmp_path / "nowhere/estimates.pdf")

@@ -237,6 +237,7 @@ def test_run_samples_takes_any_column_of_numbers(column: Any) -> None:
         ({"theta": polars.Series(["0.3"] * 200)}, "samples: theta is no column of numbers"),
         ({"theta": np.ones(200, np.bool_)}, "samples: theta is no column of numbers"),
         ({"z_ddot": np.full(200, 1e300)}, "samples: z_ddot is 1e+300 at index 0: more than a float holds"),
+        ({"z_ddot": np.full(200, -np.inf)}, "samples: z_ddot is -inf at index 0: NaN is missing"),
         ({"tau": np.zeros(200)}, "unknown columns of samples: tau; they may be time_us, theta, "),
     ],
 )
