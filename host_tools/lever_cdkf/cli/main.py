@@ -10,7 +10,9 @@ import io
 import os
 import re
 import sys
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -81,6 +83,12 @@ class Parser(argparse.ArgumentParser):
             message = f"{choice[1]}{choice[2]}: {message}" if message else choice[0]
         raise LeverError(f"{message} (see `{self.prog} --help`)")
 
+    def _get_value(self, action: argparse.Action, arg_string: str) -> Any:
+        """As argparse does, but a file or folder without a name is an error: Path("") is the current folder."""
+        if not arg_string and (action.type is Path or action.dest in ("out", "output")):
+            raise argparse.ArgumentError(action, "it is empty: give a name")
+        return super()._get_value(action, arg_string)
+
 
 class _Group(argparse.Action):
     """A heading with some commands, as the formatter of help wants it."""
@@ -117,7 +125,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             _check_json(args)
             if (prepare := getattr(args, "prepare", None)) is not None:
                 prepare(args)
-            with interrupts.heard():
+            with interrupts.heard(), _json_printed(args):
                 status: int = args.run(args) or 0
         except SystemExit as stop:  # --help and --version
             status = int(stop.code or 0)
@@ -158,10 +166,24 @@ def _has_streams() -> bool:
 def _check_json(args: argparse.Namespace) -> None:
     """Before a command has worked for --json FILE; a folder that it makes itself, by --out, need not be there yet."""
     path, out = getattr(args, "json", None), getattr(args, "out", None)
-    if path is not None:
+    if path not in (None, "-"):
         folders = () if out is None else (Path(out).absolute(), *Path(out).absolute().parents)
         if Path(path).absolute().parent not in folders or Path(path).parent.exists():
             check_writable(path)
+
+
+@contextmanager
+def _json_printed(args: argparse.Namespace) -> Iterator[None]:
+    """With --json -, write JSON to standard output, and to standard error what is printed besides."""
+    if getattr(args, "json", None) != "-":
+        yield
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        args.json = str(Path(folder) / "standard output")
+        with redirect_stdout(sys.stderr):
+            yield
+        if Path(args.json).exists():
+            sys.stdout.write(Path(args.json).read_text(encoding="utf-8"))
 
 
 def _said(error: Exception) -> str:

@@ -24,7 +24,10 @@ Tables = Mapping[str, Sequence[Row]]
 def add_json_option(parser: argparse._ActionsContainer) -> None:
     """Give a command the option --json FILE, for print_tables()."""
     parser.add_argument(
-        "--json", metavar="FILE", help="also write what is printed to FILE, as JSON: {title: [row, …], provenance: …}"
+        "--json",
+        metavar="FILE",
+        help="also write what is printed to FILE, as JSON: {title: [row, …], provenance: …}; - is standard output, and "
+        "what is printed goes to standard error",
     )
 
 

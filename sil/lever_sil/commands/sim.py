@@ -226,10 +226,14 @@ def _list(json_file: str | None) -> int:
 
     from ..scenarios.scenario import load, names
 
-    scenarios = [load(name) for name in names()]
-    rows: list[Row] = [
-        {"name": scenario.name, "duration [s]": scenario.duration, "title": scenario.title} for scenario in scenarios
-    ]
+    rows: list[Row] = []
+    for name in names():
+        try:
+            scenario = load(name)
+        except LeverError as error:  # one of the user's: the others are listed
+            print(f"lever: warning: left out: {error}", file=sys.stderr)
+            continue
+        rows.append({"name": scenario.name, "duration [s]": scenario.duration, "title": scenario.title})
     print_tables({"scenarios": rows}, json_file)
     return 0
 

@@ -16,7 +16,7 @@ from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime import files
 from lever_cdkf.runtime.files import check_writable, write_texts
 from processes import full_disk
-from python.conftest import Refused
+from python.conftest import Refused, Run
 
 TABLES: Tables = {
     "pilots": [
@@ -92,6 +92,24 @@ def test_json_has_the_same_rows(tmp_path: Path) -> None:
     content = json.loads(path.read_text(encoding="utf-8"))
     assert content.pop("provenance")["software"] == "lever-cdkf"
     assert content == {"pilots": rows, "empty": []}
+
+
+def test_json_goes_to_standard_output_and_all_else_to_standard_error(
+    lever: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    status, out, err = lever("settings", "--json", "-")
+    assert status == 0
+    assert json.loads(out)["settings"][0]["name"] == "model"
+    assert "k_p_walk" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_without_a_name_is_refused(tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for command in (("sim", "steady"), ("replay", "bus.log"), ("soak",)):
+        assert "argument -o/--out: it is empty: give a name" in refused(*command, "-o", "")
+    assert not list(tmp_path.iterdir())
 
 
 def test_json_that_cannot_be_written_is_told_before_the_work(tmp_path: Path, refused: Refused) -> None:

@@ -20,6 +20,18 @@ def test_list_names_every_scenario(lever: Run, tmp_path: Path) -> None:
     assert all(name in out for name in scenario.names())
 
 
+def test_a_broken_scenario_does_not_hide_the_others(
+    lever: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    broken = tmp_path / "broken.toml"
+    broken.write_text("title = \n")
+    monkeypatch.setattr(scenario, "names", lambda: [str(broken), "steady"])
+    status, out, err = lever("sim", "--list")
+    assert status == 0
+    assert "steady" in out
+    assert err.startswith(f"lever: warning: left out: {broken}: ")
+
+
 def test_sim_writes_its_files_and_prints_its_tables(lever: Run, tmp_path: Path) -> None:
     out_dir, tables = tmp_path / "out" / "deep", tmp_path / "tables.json"
     status, out, err = lever("sim", "steady", *SHORT, "--out", str(out_dir), "--json", str(tables))
