@@ -92,8 +92,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _verdict(result: SoakResult) -> str:
     total, faults = result.total, sum(result.faults.values())
+    flights = total.row()["flights"]
     return (
-        f"{total.row()['flights']} flights of 5 min with {faults} faults: NEES "
+        f"{flights} flight{'' if flights == 1 else 's'} of 5 min with {faults} faults: NEES "
         f"{total.row()['NEES (expected 1)']:.2f} (expected 1), "
         f"silent errors for {total.silent_s:.0f} s, {total.counts['recoveries']} restarts of the filter, memory "
         f"{result.growth:+.1f} MiB."

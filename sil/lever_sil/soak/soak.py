@@ -28,6 +28,8 @@ from .flights import AT_REST, DURATION, draw
 PARAMETERS = ("m_p", "c_p", "k_p")
 QUANTITIES = (*PARAMETERS, "natural_frequency", "damping_ratio")
 HOUR = 3600.0
+COUNTS = "silent [s]"
+"""The first column that is a count, and no measure of consistency."""
 GROWTH = 20.0
 """By so much memory may grow after the first flights, for all that Python keeps [MiB]."""
 SETTLED = 4
@@ -80,7 +82,7 @@ class Sums:
             "NEES (expected 1)": self.nees / shown,
             "NIS (expected 1)": self.nis / shown,
             **{f"{name} within 2 sigma [%]": 100.0 * count / shown for name, count in self.within.items()},
-            "silent [s]": self.silent_s,
+            COUNTS: self.silent_s,
             **{name: self.counts[name] for name in ("lost", "late", "corrupt", "recoveries")},
         }
 

@@ -98,10 +98,13 @@ def test_wrong_hours_and_seeds_are_one_line(capsys: pytest.CaptureFixture[str], 
 @pytest.mark.parametrize("troubles", [False, True])
 def test_the_page_shows_each_hour(troubles: bool) -> None:
     hours = [judged(0.1, 0.1), judged(0.1, 0.05)]
+    for each in hours:
+        each.seconds = flights.DURATION
     memory = (100.0, 130.0 if troubles else 101.0)
     result = soak.SoakResult(list(map(soak.Part, hours, memory)), 100.0, Counter())
     rows: list[Row] = [part.sums.row() for part in result.parts]
     page = Reader(soak_page.build(result, rows, "So it went."))
+    assert "Lever CDKF: 10 minutes without a reset" in "".join(page.text)
     assert ("p", {"class": f"verdict {'bad' if troubles else 'good'}"}) in page.tags
     chart = figures(page)["chart"]
     shown = {trace["name"]: (trace["yaxis"], unpack(trace["y"]).tolist()) for trace in chart["data"]}
@@ -112,6 +115,8 @@ def test_the_page_shows_each_hour(troubles: bool) -> None:
         held = [row[f"{name} within 2 sigma [%]"] for row in rows]
         assert shown[f"{name} within 2σ"] == ("y2", pytest.approx(held)), name
     assert shown["memory"] == ("y3", list(memory))
+    assert len({trace["line"]["color"] for trace in chart["data"]}) == len(chart["data"])
+    assert {trace["mode"] for trace in chart["data"]} == {"lines+markers"}
     assert chart["layout"]["xaxis"]["range"] == [0.5, 2.5]
     assert [(shape["y0"], shape["y1"]) for shape in chart["layout"]["shapes"]] == [(1.0, 1.0)]
     assert not chart["over_time"]
