@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from lever_cdkf.firmware.aircraft import ALARM, WARNING
-from lever_cdkf.report.figure import Figure, axis, band, line, time_axis
+from lever_cdkf.report.figure import Figure, Spec, axis, band, line, time_axis
 from lever_cdkf.report.page import Page
 
 from ..acceptance import acceptance_page
@@ -15,6 +15,8 @@ from .measure import Excerpt
 from .run_conditions import BounceResult
 
 _MOST = 15.0  # [dB]
+_LEGEND = {"orientation": "h", "x": 0, "y": 1.06, "yanchor": "bottom", "traceorder": "normal"}
+"""Above the names of the moments."""
 
 
 def build(results: Sequence[BounceResult], seeds: int) -> str:
@@ -51,8 +53,12 @@ def _chart(shown: Excerpt, flight: str) -> Figure:
     )
     figure.add(line(shown.time, shown.z_ddot, "z̈", "torque", 2))
     figure.level(0.0, WARNING, ALARM)
+    for level, word, anchor in ((WARNING, "warning", "bottom"), (ALARM, "alarm", "top"), (0.0, "unstable", "top")):
+        at: Spec = {"xref": "paper", "x": 1.0, "xanchor": "right", "yref": "y", "y": level, "yanchor": anchor}
+        figure.annotations.append({"text": f"{word}: {level:g} dB", "showarrow": False, "font": {"size": 10}} | at)
     figure.mark(list(shown.moments.values()))
     for place, (name, moment) in enumerate(shown.moments.items()):
         side = {"xanchor": "right" if place == 0 else "left", "yanchor": "bottom", "showarrow": False}
         figure.annotations.append({"x": moment, "y": 1.0, "yref": "paper", "text": name} | side)
+    figure.more |= {"legend": _LEGEND}
     return figure

@@ -63,6 +63,13 @@ def test_of_many_values_four_are_written_with_both_ends() -> None:
     assert [text.get_text() for text in axes.get_yticklabels()] == ["1", "4", "7", "10"]
 
 
+def test_the_values_that_are_written_are_evenly_spaced_where_they_can_be() -> None:
+    shown = {count: Scale("x", tuple(map(float, range(count)))).ticks(4) for count in (1, 2, 3, 4, 5, 6, 7)}
+    assert shown[5] == [0, 2, 4]
+    assert shown[6] == [0, 2, 3, 5]
+    assert shown == {1: [0], 2: [0, 1], 3: [0, 1, 2], 4: [0, 1, 2, 3], 5: shown[5], 6: shown[6], 7: [0, 2, 4, 6]}
+
+
 def test_large_numbers_are_written_out() -> None:
     assert [maps.written(value) for value in (0.0123, 1.24, 99.9, 1500.0, -1500.0, 3.6e6, "fixed")] == [
         *("0.012", "1.2", "100", "1500", "-1500", "3600000", "fixed")

@@ -27,6 +27,11 @@ class Scale:
     is_log: bool = False
 
     @property
+    def shown_label(self) -> str:
+        """Return the label as charts have it."""
+        return self.label.replace("sqrt(s)", "√s")
+
+    @property
     def position(self) -> Array:
         """Return the positions of the cells, evenly spaced where the scale is even.
 
@@ -52,8 +57,10 @@ class Scale:
         return np.concatenate(([2.0 * at[0] - middle[0]], middle, [2.0 * at[-1] - middle[-1]]))
 
     def ticks(self, most: int) -> list[int]:
-        """Return indices of values that are written at the axis, both ends among them."""
-        return sorted({round(at) for at in np.linspace(0.0, len(self.values) - 1.0, most)})
+        """Return indices of values that are written at the axis, both ends among them; evenly spaced where possible."""
+        last = len(self.values) - 1
+        count = max((count for count in range(3, most + 1) if last % (count - 1) == 0), default=most)
+        return sorted({round(at) for at in np.linspace(0.0, last, count)})
 
     def value(self, position: float) -> float:
         """Return what is at a position; infinities and NaN stay."""

@@ -118,7 +118,10 @@ def map_spec(figure: MapFigure) -> chart.Spec:
     down, across = len(figure.rows), len(figure.columns.values)
     layout: chart.Spec = {"height": _CELL * down + _TITLE + _FOOT, "hovermode": "closest", "showlegend": False}
     left = _LABEL + _LETTER * max(len(written(value)) for value in figure.y.values)
-    layout |= {"margin": {"l": left, "r": 12, "t": _TITLE, "b": _FOOT}, "annotations": [_beside(figure.y.label, left)]}
+    layout |= {
+        "margin": {"l": left, "r": 12, "t": _TITLE, "b": _FOOT},
+        "annotations": [_beside(figure.y.shown_label, left)],
+    }
     data: list[chart.Spec] = []
     for number, (row, column) in enumerate(product(range(down), range(across)), 1):
         suffix = "" if number == 1 else str(number)
@@ -148,7 +151,7 @@ def _map_axis(scale: Scale, *, ticks: bool, label: bool = False) -> chart.Spec:
     more["range"] = (edges / math.log(10.0) if scale.is_log else edges).tolist()
     if scale.is_log:
         more["type"] = "log"
-    return chart.axis(html.escape(scale.label) if label else "", **more)
+    return chart.axis(html.escape(scale.shown_label) if label else "", **more)
 
 
 def _places(scale: Scale) -> Array:

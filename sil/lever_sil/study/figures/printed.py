@@ -92,8 +92,8 @@ def _maps(figure: MapFigure, width: str) -> Sheet:
                 place.set_title(written(figure.columns.values[column]))
         if figure.columns.label:
             drawn.suptitle(figure.columns.label, fontsize=7.5)
-        drawn.supxlabel(figure.x.label, fontsize=7.5)
-        drawn.supylabel(figure.y.label, fontsize=7.5)
+        drawn.supxlabel(figure.x.shown_label, fontsize=7.5)
+        drawn.supylabel(figure.y.shown_label, fontsize=7.5)
         drawn.colorbar(shades, ax=places, label=figure.label, aspect=30)
     return drawn
 
