@@ -13,8 +13,6 @@ import argparse
 import re
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..errors import LeverError
-
 if TYPE_CHECKING:
     import can
 
@@ -151,5 +149,5 @@ def _number(text: str, most: int) -> int:
     except ValueError:
         number = -1
     if not 0 <= number <= most:
-        raise LeverError(f"{text}: must be a number from 0 to {most:#x}, such as 0x40")
+        raise argparse.ArgumentTypeError(f"{text!r} must be a number from 0 to {most:#x}, such as 0x40")
     return number

@@ -35,7 +35,7 @@ def _lines(text: str, width: int) -> Iterator[str]:
         if item is None:
             yield from wrapped(part, width)
         elif not left:
-            yield from [part] if len(part) <= width else _command(item[2], width)
+            yield from [part] if len(part) <= width else _command(item[2], width, item[1])
         elif len(left) <= width // 2:
             first, *others = wrapped(item[3], width - len(left))
             yield left + first
@@ -45,8 +45,8 @@ def _lines(text: str, width: int) -> Iterator[str]:
             yield from (_INDENT + line for line in wrapped(item[3], width - len(_INDENT)))
 
 
-def _command(text: str, width: int) -> Iterator[str]:
-    return (f"  {line}" for line in command_lines(text, width - 2))
+def _command(text: str, width: int, indent: str = "  ") -> Iterator[str]:
+    return (f"{indent}{line}" for line in command_lines(text, width - len(indent)))
 
 
 def _joined(text: str) -> list[str]:

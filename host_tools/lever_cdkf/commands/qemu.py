@@ -54,12 +54,13 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         action="store_true",
         help="8 ns an instruction, without waiting: the same virtual time in every run (default: the clock's)",
     )
-    parser.add_argument(
+    command = parser.add_argument(
         "command",
         metavar="-- COMMAND",
         nargs=argparse.REMAINDER,
         help=f"run this with {_CHANNEL} replaced, then stop",
     )
+    command.required = False  # before Python 3.12, argparse asks for the rest of the line
 
 
 def run(args: argparse.Namespace) -> int:

@@ -21,9 +21,10 @@ _LEGEND = {"orientation": "h", "x": 0, "y": 1.06, "yanchor": "bottom", "traceord
 
 def build(results: Sequence[BounceResult], seeds: int) -> str:
     """Return the whole page."""
+    pilots = "1 random pilot" if seeds == 1 else f"{seeds} random pilots"
     page = Page(
         "Collective bounce: seen coming, and how far it is held off",
-        f"{seeds} random pilots with each of {len(AIRCRAFT)} aircraft, or with {len(FIVE)} in turn where it is about "
+        f"{pilots} with each of {len(AIRCRAFT)} aircraft, or with {len(FIVE)} in turn where it is about "
         f"what lies between accelerometer and pilot ({', '.join(FIVE)}), the firmware as shipped in the loop. What "
         "limits the mitigation is that airframe and body: mount the accelerometer on the structure that carries the "
         "pilot's seat. "

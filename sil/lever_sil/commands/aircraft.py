@@ -28,8 +28,7 @@ A linear model of another tool is a .mat, .npz or .csv file with the matrices A,
 collective pitch [rad] and gust [m/s^2], outputs vertical acceleration at the pilot's seat and at the accelerometer
 [m/s^2]. It flies: its name is the `model` of [aircraft] in a scenario. Keys of its own are
   input                    what the collective input is: blade (default), or actuator, where that is in the model
-  collective_input, gust_input, seat_output, accelerometer_output
-                           which of more inputs and outputs they are, from 1
+  collective_input, gust_input, seat_output, accelerometer_output  which of more inputs and outputs they are, from 1
 
 A response that was measured or computed elsewhere, with gearing, is a .csv file of frequency [Hz], real and imaginary
 part of the acceleration at the seat over the lever's angle [(m/s^2)/rad]; two columns more are that at the seat over

@@ -13,9 +13,10 @@ from .run_conditions import EnvelopeResult
 
 def build(results: Sequence[EnvelopeResult], seeds: int) -> str:
     """Return the whole page."""
+    pilots = "1 random pilot" if seeds == 1 else f"{seeds} random pilots"
     page = Page(
         "The conditions that a collective meets",
-        f"Levers and pilots by a plant that shares nothing with the filter's model, {seeds} random pilots a condition, "
+        f"Levers and pilots by a plant that shares nothing with the filter's model, {pilots} a condition, "
         "the firmware as shipped. Charts: the natural frequency with its ±2σ, of each condition in the run in which it "
         "was worst.",
         "lever envelope",

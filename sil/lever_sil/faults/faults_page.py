@@ -72,7 +72,7 @@ def _cells(result: RowResult) -> list[str]:
     name = html.escape(result.row.name)
     if word != HOLDS:
         name, word = f'<a href="#{name}">{name}</a>', f'<strong class="missed">{word}</strong>: {missed(result)}'
-    figures = ("to flag", "back [s]", "error after [%]", "silent [s]", "right [%]")
+    figures = ("to flag [samples]", "back [s]", "error after [%]", "silent [s]", "right [%]")
     shown = ["never" if row[column] is None else str(row[column]) for column in figures]
     return [name, html.escape(result.row.title), html.escape(demands(result.row.requirement)), word, *shown]
 

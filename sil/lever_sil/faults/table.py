@@ -54,7 +54,7 @@ def lines(results: Sequence[RowResult]) -> list[Row]:
             "fault": result.row.name,
             "result": state(result),
             "missed": missed(result),
-            "to flag": _whole(result, "to flag"),
+            "to flag [samples]": _whole(result, "to flag"),
             "back [s]": _number(result.worst("back")),
             "error after [%]": _number(result.worst("error after")),
             "silent [s]": _number(result.worst("silent")),

@@ -25,7 +25,7 @@ from lever_cdkf.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.firmware.settings_file import setting_value
 from lever_cdkf.numeric.arrays import FloatArray
 from lever_cdkf.results.trace import CONVERGED_AFTER
-from lever_cdkf.text.suggestions import nearest_names
+from lever_cdkf.text.suggestions import did_you_mean, nearest_names
 from lever_cdkf.text.toml_text import MOST_NESTED
 from lever_cdkf.text.units import UnitError
 
@@ -101,8 +101,8 @@ def _read_numbers(readers: Mapping[str, Reader]) -> Reader:
             raise place.error(f"{values!r} is not a table")
         for name in values:
             if name not in readers:
-                near = "".join(f"; did you mean {each}?" for each in nearest_names(name, readers, 1))
-                raise place.error(f"unknown key {name!r}; allowed: {', '.join(readers)}{near}")
+                hint = did_you_mean(name, readers, f"allowed: {', '.join(readers)}")
+                raise place.error(f"unknown key {name!r}; {hint}")
         return {name: readers[name](value, place.at(name)) for name, value in values.items()}
 
     return reader

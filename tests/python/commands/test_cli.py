@@ -214,6 +214,18 @@ def test_bad_input_is_one_line(arguments: list[str], text: str, refused: Refused
 
 
 @pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["record", "--duration", "-1"], "argument --duration: '-1' is not a number of seconds above 0"),
+        (["replay", "x", "--id-offset", "abc"], "argument --id-offset: 'abc' must be a number from 0 to 0x5e0"),
+        (["qemu"], "the following arguments are required: IMAGE (see"),
+    ],
+)
+def test_bad_input_names_the_option(arguments: list[str], text: str, refused: Refused) -> None:
+    assert text in refused(*arguments)
+
+
+@pytest.mark.parametrize(
     ("error", "status", "text"),
     [
         (LeverError("no such pilot"), 2, "lever: error: no such pilot\n"),

@@ -247,3 +247,9 @@ def test_help_keeps_paragraphs_lists_and_commands() -> None:
         "  lever sim --out DIR \\",
         "      --a 1",
     ]
+    goes_on = "  lever qemu image -- \\\n      lever sim steady --bus x\n"
+    assert HelpFormatter("x")._fill_text(goes_on, 24, "").splitlines() == [
+        "  lever qemu image -- \\",
+        "      lever sim steady \\",
+        "          --bus x",
+    ]
