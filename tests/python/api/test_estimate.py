@@ -162,7 +162,7 @@ def test_what_is_of_another_kind_is_refused_in_words(columns: Columns) -> None:
         ({"names": "theta"}, "names = 'theta': give them by input"),
     ):
         with pytest.raises(LeverError, match=said):
-            estimate(frame, **options)  # type: ignore[arg-type]
+            estimate(frame, **options)
     for text in (frame.astype(str), frame.astype(object), frame.astype("string")):
         with pytest.raises(LeverError, match="time is no column of numbers"):
             estimate(text)
