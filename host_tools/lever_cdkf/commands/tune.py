@@ -152,6 +152,8 @@ def _as_recorded(assignments: Assignments, recording: Recording) -> Assignments:
     from ..firmware.config import Config
     from ..firmware.settings_file import make_config
 
+    for note in recording.notes:
+        _note(note)
     usual = Config().choices
     chosen = {
         name: value for name, value in recording.choices.items() if value != usual[name] and name not in assignments

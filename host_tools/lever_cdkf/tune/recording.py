@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..firmware.config import Config, setting
 from ..firmware.estimator import Health
 from ..firmware.innovations import FRAME, samples_of
 from ..numeric.arrays import Array
-from ..signals.mapped_frames import frames_for_estimator
+from ..signals.mapped_frames import MappedFrames, frames_for_estimator
 from ..signals.reading import Reading
 
 
@@ -32,6 +32,8 @@ class Recording:
     """Of model, preload, estimator and adaptation, by COMMAND in the log; the firmware's defaults without."""
     health: Health
     """Counts of what was lost, corrupt or late."""
+    notes: tuple[str, ...] = ()
+    """What was guessed of mapped signals or is odd, a sentence each."""
 
     @property
     def duration(self) -> float:
@@ -72,7 +74,8 @@ def read(
     if reading.channel is None and traffic.other_samples:
         buses = " or --channel ".join(sorted({str(traffic.channel), *traffic.other_samples}))
         raise LeverError(f"{name}: samples on more than one bus: choose by --channel {buses}")
-    return _recording(np.concatenate(pieces), str(traffic.channel), name)
+    notes = tuple(traffic.loaded.notes) if isinstance(traffic, MappedFrames) else ()
+    return replace(_recording(np.concatenate(pieces), str(traffic.channel), name), notes=notes)
 
 
 def _recording(frames: Array, bus: str, log: str) -> Recording:

@@ -329,9 +329,11 @@ def test_tune_takes_the_same(folder: Path, tmp_path: Path, capsys: pytest.Captur
     arguments += ["--keep", "m_p_walk", "--keep", "c_p_walk", "--keep", "k_p_walk"]
     arguments += ["--page", tmp_path / "tune.html", "--clock", "z_ddot"]
     assert main(["tune", str(folder / "flight.blf"), *map(str, arguments)]) == 0
+    printed = capsys.readouterr()
+    assert "gravity is in it, and is subtracted" in printed.err
     assert "sample_period = 0.002" in (tmp_path / "my.settings").read_text()
     assert " lost)" not in (tmp_path / "tune.html").read_text()
-    words = shlex.split(capsys.readouterr().out.partition("Next:\n")[2].replace("\\\n", " "))
+    words = shlex.split(printed.out.partition("Next:\n")[2].replace("\\\n", " "))
     assert {("--clock", "z_ddot"), ("--dbc", str(folder / "foreign.dbc"))} <= set(itertools.pairwise(words))
     assert main([*words[1:], "-o", str(tmp_path / "out"), "--format", "csv"]) == 0
 
