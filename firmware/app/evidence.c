@@ -363,10 +363,12 @@ void evidence_show(evidence_t *evidence)
     }
 }
 
-bool evidence_of_change(evidence_t *evidence, const correction_t *correction, const evidence_block_t *block)
+bool evidence_of_change(
+    evidence_t *evidence, const cdkf_t *cdkf, const correction_t *correction, const evidence_block_t *block)
 {
     const lever_settings_t *s = block->setup->settings;
-    const float statistic = change_detection_step(&evidence->change, correction, block->period, s->change_memory);
+    const float statistic =
+        change_detection_step(&evidence->change, correction, &cdkf->scaling, block->period, s->change_memory);
     const float ratio = (s->change_threshold > 0.0f) ? (statistic / s->change_threshold) : 0.0f;
     const float since = evidence->since_change;
     const bool again = (since > s->change_memory) && block->known && (evidence->ratio[EVIDENCE_HANDS] < HELD);

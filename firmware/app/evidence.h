@@ -185,7 +185,8 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
 void evidence_show(evidence_t *evidence);
 
 /* A correction that the block has taught. Returns true when the pilot has changed. */
-bool evidence_of_change(evidence_t *evidence, const correction_t *correction, const evidence_block_t *block);
+bool evidence_of_change(
+    evidence_t *evidence, const cdkf_t *cdkf, const correction_t *correction, const evidence_block_t *block);
 
 /* The pilot changed just now; `opened`: to another one. An arm that is not known yet does not grip anew. */
 void evidence_begin_change(evidence_t *evidence, bool known, bool opened);

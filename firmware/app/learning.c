@@ -127,7 +127,7 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
         if (cdkf->acting > (uint32_t)CDKF_STEP) {
             correction.bounded = cdkf_learn_step(cdkf, &step);
         }
-        if (evidence_of_change(&learning->evidence, &correction, block)) {
+        if (evidence_of_change(&learning->evidence, cdkf, &correction, block)) {
             evidence_begin_change(&learning->evidence, block->known, false);
             walk = block->known ? turn(learning, setup, cdkf, verdict_of(learning->evidence.present))
                                 : disturb_unknown(learning, setup->settings, cdkf);

@@ -114,10 +114,12 @@ void cdkf_time_update(cdkf_t *cdkf, const model_t *model, const model_constants_
 void cdkf_measurement_update(cdkf_t *cdkf, const float y[CDKF_OUTPUTS], const bool valid[CDKF_OUTPUTS], bool learn,
     innovation_t innovation[CDKF_OUTPUTS]);
 
-/* What a block has taught: the change of w, and by how much its variances have become smaller. */
+enum { CDKF_TRIANGLE = (MODEL_PARAMETERS * (MODEL_PARAMETERS + 1)) / 2 };
+
+/* What a block has taught: the change of w, and by how much its covariance has become smaller (lower triangle). */
 typedef struct correction {
     float w[MODEL_PARAMETERS];
-    float variance[MODEL_PARAMETERS];
+    float covariance[CDKF_TRIANGLE];
     bool bounded; /* a parameter rests on a bound */
 } correction_t;
 
@@ -143,8 +145,6 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
 /* Opens the covariance of w to the prior's again and drops pending information. What w explained of the state's
  * uncertainty stays with the state. */
 void cdkf_open(cdkf_t *cdkf);
-
-enum { CDKF_TRIANGLE = (MODEL_PARAMETERS * (MODEL_PARAMETERS + 1)) / 2 };
 
 /* The belief of the parameters alone, kept to return to. */
 typedef struct snapshot {

@@ -97,11 +97,25 @@ score_t cdkf_constant_score(const cdkf_t *cdkf, uint32_t c)
     return considered_score(&cdkf->considered[c], &cdkf->pending);
 }
 
+/* Adds `factor` times P_ww to a lower triangle. */
+static void add_covariance(const cdkf_t *cdkf, float factor, float covariance[CDKF_TRIANGLE])
+{
+    uint32_t k = 0u;
+    for (uint32_t i = 0u; i < L; i++) {
+        for (uint32_t j = 0u; j <= i; j++) {
+            covariance[k] += factor * factor_dot_three(&cdkf->s[i * L], &cdkf->s[j * L]);
+            k++;
+        }
+    }
+}
+
 void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correction)
 {
     float *u = cdkf->pending.matrix;
     float *step = cdkf->pending.vector; /* of w in coordinates of the columns of S_ww */
-    if (u[0] > 0.0f) {                  /* there is information */
+    (void)memset(correction, 0, sizeof *correction);
+    add_covariance(cdkf, 1.0f, correction->covariance);
+    if (u[0] > 0.0f) { /* there is information */
         cdkf->trust = lesser(cdkf->trust + share_of(period, caution), 1.0f);
     }
     for (uint32_t i = 0u; i < L; i++) {
@@ -109,7 +123,6 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
             u[(i * L) + j] *= cdkf->trust;
         }
         step[i] *= cdkf->trust;
-        correction->variance[i] = factor_variance(cdkf->s, L, i);
         correction->w[i] = cdkf->w[i];
     }
     factor_reverse(u, L);
@@ -123,8 +136,8 @@ void cdkf_learn(cdkf_t *cdkf, float period, float caution, correction_t *correct
     considered_learn(cdkf->considered, cdkf->acting, cdkf->trust, u);
     cdkf_drop_pending(cdkf);
     correction->bounded = scaling_bound(&cdkf->scaling, cdkf->w);
+    add_covariance(cdkf, -1.0f, correction->covariance);
     for (uint32_t i = 0u; i < L; i++) {
-        correction->variance[i] -= factor_variance(cdkf->s, L, i);
         correction->w[i] = cdkf->w[i] - correction->w[i];
     }
     INVARIANT(factor_is_whole(cdkf->s, L));

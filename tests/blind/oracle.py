@@ -373,7 +373,7 @@ def finite(flight: Flight) -> list[str]:
     ]
     if (values < 0.99999 * LEAST).any() or (values > 1.00001 * GREATEST).any():
         said.append(sentence(flight, flight.begin, "R9", f"parameters from {values.min(0)} to {values.max(0)}"))
-    rests = ((values <= 1.00001 * LEAST) | (values >= 0.99999 * GREATEST)).any(axis=1)
+    rests = ((values <= 1.000001 * LEAST) | (values >= 0.999999 * GREATEST)).any(axis=1)  # of float's rounding
     silent = np.flatnonzero(rests & ((flight.faults[flight.read] & BOUND) == 0))
     if len(silent):
         at = int(flight.sample[flight.read[silent[0]]])

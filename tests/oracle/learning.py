@@ -86,7 +86,7 @@ class Learning:
         self.disturbance = 0.0  # process noise of θ̇ besides [rad/s/√s]
         self.trust = seconds(0.0)  # part of the information that counts [1], counted like time
         self.noise = NoiseEstimation(settings)
-        self.change = ChangeDetection(settings["change_memory"], settings["change_threshold"])
+        self.change = ChangeDetection(settings["change_memory"], settings["change_threshold"], scale.sigma)
         self.elapsed = 0.0  # since the parameters learnt last [s]
         self.counted = seconds(0.0)  # the same
         self.since_change, self.awake = seconds(LONG_AGO), seconds(0.0)
@@ -133,10 +133,10 @@ class Learning:
         if self.adapted:
             self._estimate_noise(counted)
         score = self.belief.step_score if isinstance(self.belief, TwoStage) else StepScore()
-        correction, variance = self._learn(counted)
+        correction, covariance = self._learn(counted)
         if learns and self.step_sigma > 0.0:
             self._learn_step(score)
-        if learns and self.adapted and self._has_changed(correction, variance, period):
+        if learns and self.adapted and self._has_changed(correction, covariance, period):
             suddenly = self._follow(lesson)
         self.belief.forget(self.growth * period)
         self.belief.walk(self.walk * period + self.floor * suddenly)
@@ -189,7 +189,7 @@ class Learning:
         return self.settings["change_walk"] if verdict == "regrip" else 0.0
 
     def _learn(self, period: np.float32) -> tuple[Array, Array]:
-        """Return the change of w, and by how much its variance shrinks. At first information counts in part: far
+        """Return the change of w, and by how much its covariance shrinks. At first information counts in part: far
         from the truth the sensitivities are wrong."""
         if self.belief.pending:
             caution = seconds(self.settings["caution_time"])
@@ -200,7 +200,7 @@ class Learning:
         self.belief.bound(self.bounds[:, 0], self.bounds[:, 1])
         if self.adapted:
             correction = self.belief.w - w
-        return correction, np.sum(factor**2 - self.belief.w_factor**2, axis=1)
+        return correction, factor @ factor.T - self.belief.w_factor @ self.belief.w_factor.T
 
     def _follow(self, lesson: Lesson) -> float:
         """Follow a change: a known arm grips anew; of an unknown one, torque is unknown. Return seconds of the walk."""
@@ -218,9 +218,9 @@ class Learning:
             noise = self.settings["noise_range"] * self.settings["theta_dot_process_noise"]
             self.disturbance = part * DISTURBANCE * noise
 
-    def _has_changed(self, correction: Array, variance: Array, period: float) -> bool:
+    def _has_changed(self, correction: Array, covariance: Array, period: float) -> bool:
         """Return whether the corrections say so; soon after another change of a known arm only."""
-        detected = self.change.step(correction, variance, period)
+        detected = self.change.step(correction, covariance, period)
         known = self.kept[1].trust >= 1.0
         again = self.since_change > seconds(self.settings["change_memory"]) and known
         return bool(detected and (self.since_change >= REPORTED or again))

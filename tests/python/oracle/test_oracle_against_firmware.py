@@ -147,7 +147,7 @@ CASES = (
     Case(seconds=6.0, force=True, settings=FORCE),
     Case(estimator="joint", preload="fixed", seconds=6.0, force=True, settings=FORCE),
     Case(model="hand", force=True),
-    Case(adaptation="robbins_monro", seconds=10.0, settings=QUIET, flags=("change", "innovation")),
+    Case(adaptation="robbins_monro", seconds=10.0, settings=QUIET, flags=("innovation",)),
 )
 
 

@@ -147,12 +147,12 @@ def test_without_motion_the_walk_is_at_its_floor_and_the_uncertainty_limited() -
 def test_white_corrections_are_no_change_and_a_drift_is() -> None:
     """The statistic is chi-square with three degrees of freedom: 30 has a probability of 1e-6."""
     rng, variance = np.random.default_rng(3), np.array([1.0, 4.0, 0.25])
-    change = ChangeDetection(memory=0.3, threshold=30.0)
+    change = ChangeDetection(memory=0.3, threshold=30.0, prior_sigma=np.full(3, 0.5))
     white = rng.standard_normal((20000, 3)) * np.sqrt(variance)
-    assert not any(change.step(correction, variance, 0.02) for correction in white)
+    assert not any(change.step(correction, np.diag(variance), 0.02) for correction in white)
     assert change.average == pytest.approx(1.0, abs=0.3)
     drift = np.sqrt(variance) * [2.0, 0.0, 0.0]
-    assert any(change.step(correction + drift, variance, 0.02) for correction in white[:30])
+    assert any(change.step(correction + drift, np.diag(variance), 0.02) for correction in white[:30])
 
 
 # --- trim ------------------------------------------------------------------------------------------------------------

@@ -26,6 +26,8 @@ void setUp(void)
     setup.constants.inertia = 1.0f;
     (void)memset(&cdkf, 0, sizeof cdkf);
     cdkf.trust = 1.0f;
+    cdkf.scaling.prior = (prior_t){.sigma = {0.5f, 0.5f, 0.5f}};
+    cdkf.scaling.positive = true;
     evidence_start(&evidence);
     source.state = 21u;
 }
@@ -724,13 +726,13 @@ TEST(a_change_is_found_once_and_not_while_something_else_is_to_be_judged_first)
     for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
         const evidence_block_t block = {.setup = &setup, .period = 0.02f, .known = row[i].known};
         const float drift = row[i].drift;
-        const correction_t correction = {.w = {drift, drift, drift}, .variance = {1.0f, 1.0f, 1.0f}};
+        const correction_t correction = {.w = {drift, drift, drift}, .covariance = {1.0f, 0.0f, 1.0f, 0.0f, 0.0f, 1.0f}};
         setUp();
         config.settings.change_threshold = row[i].threshold;
         evidence.since_change = row[i].since;
         evidence.ratio[EVIDENCE_HANDS] = row[i].hands;
         evidence.ratio[EVIDENCE_BASE] = row[i].base;
-        TEST_ASSERT_EQUAL(row[i].is, evidence_of_change(&evidence, &correction, &block));
+        TEST_ASSERT_EQUAL(row[i].is, evidence_of_change(&evidence, &cdkf, &correction, &block));
     }
 }
 

@@ -58,7 +58,7 @@ TEST(opening_forgets_what_was_learnt_and_keeps_estimate_and_state)
     cdkf_learn(cdkf, 0.01f, 0.0f, &correction); /* nothing is pending */
     TEST_ASSERT_EQUAL_MEMORY(before.w, cdkf->w, sizeof before.w);
     TEST_ASSERT_EQUAL_MEMORY(before.x, cdkf->x, sizeof before.x);
-    TEST_ASSERT_TRUE((correction.variance[0] == 0.0f) && (correction.variance[2] == 0.0f));
+    TEST_ASSERT_TRUE((correction.covariance[0] == 0.0f) && (correction.covariance[5] == 0.0f));
 }
 
 TEST(a_state_that_starts_anew_is_independent_of_w_and_drops_what_is_pending)
