@@ -312,7 +312,7 @@ def changed(flight: Flight) -> list[str]:
                 )
     if flight.event.name == "stiffer" and flight.mode.state == "run":
         truth, known = natural_frequency(1.4), float(flight.estimate["natural_frequency"][-1])
-        if abs(known / truth - 1.0) > 0.05:  # README: f_n to 5 % in at most 4.4 s (`sudden_grip`); 7 s have passed
+        if abs(known / truth - 1.0) > 0.05:  # README: f_n to 5 % in at most 2.7 s (`sudden_grip`); 7 s have passed
             said.append(sentence(flight, int(flight.sample[-1]), "R6", f"{known:.2f} Hz where {truth:.2f} Hz is true"))
     return said
 
