@@ -726,7 +726,8 @@ TEST(a_change_is_found_once_and_not_while_something_else_is_to_be_judged_first)
     for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
         const evidence_block_t block = {.setup = &setup, .period = 0.02f, .known = row[i].known};
         const float drift = row[i].drift;
-        const correction_t correction = {.w = {drift, drift, drift}, .covariance = {1.0f, 0.0f, 1.0f, 0.0f, 0.0f, 1.0f}};
+        const correction_t correction = {
+            .w = {drift, drift, drift}, .covariance = {1.0f, 0.0f, 1.0f, 0.0f, 0.0f, 1.0f}};
         setUp();
         config.settings.change_threshold = row[i].threshold;
         evidence.since_change = row[i].since;

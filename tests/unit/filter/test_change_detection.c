@@ -12,7 +12,8 @@ enum { L = MODEL_PARAMETERS };
 #define THRESHOLD 30.0f
 
 static change_detection_t change;
-static const scaling_t scaling = {.prior = {.guess = {1.0f, 1.0f, 1.0f}, .sigma = {0.5f, 0.5f, 0.5f}}, .positive = true};
+static const scaling_t scaling = {
+    .prior = {.guess = {1.0f, 1.0f, 1.0f}, .sigma = {0.5f, 0.5f, 0.5f}}, .positive = true};
 static const double sigma[L] = {1.0e-2, 3.0e-3, 0.2}; /* of a correction: scales do not matter */
 
 void setUp(void)
