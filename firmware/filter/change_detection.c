@@ -6,8 +6,8 @@
 #include <string.h>
 
 #define L ((uint32_t)MODEL_PARAMETERS)
-#define LONG 100.0f   /* memory of the long average, in memories of the sum */
-#define LEAST 1.0e-3f /* standard deviation that the sum always has, in those of the prior: beyond rounding */
+#define LONG 100.0f       /* memory of the long average, in memories of the sum */
+#define SUM_LEAST 1.0e-3f /* standard deviation that the sum always has, in those of the prior: beyond rounding */
 
 void change_detection_init(change_detection_t *change)
 {
@@ -26,7 +26,7 @@ float change_detection_step(
     uint32_t k = 0u;
     for (uint32_t i = 0u; i < L; i++) {
         change->sum[i] = (keep * change->sum[i]) + correction->w[i];
-        inverse[i] = 1.0f / (LEAST * scaling_prior_sigma(scaling, i));
+        inverse[i] = 1.0f / (SUM_LEAST * scaling_prior_sigma(scaling, i));
         z[i] = inverse[i] * change->sum[i];
         for (uint32_t j = 0u; j <= i; j++) {
             change->covariance[k] = (keep * keep * change->covariance[k]) + correction->covariance[k];

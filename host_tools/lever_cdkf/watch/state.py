@@ -134,7 +134,11 @@ class State:
             "condition": text,
             "mode": picture.mode,
             "silence": picture.silence(),
-            "health": [*status.facts(picture, source), ("firmware", picture.identity.version or status.NOTHING, "")],
+            "health": [
+                *status.facts(picture, source),
+                ("model", picture.identity.choices.get("model") or status.NOTHING, ""),
+                ("firmware", picture.identity.version or status.NOTHING, ""),
+            ],
             "messages": [
                 [entry.name, entry.rate if entry.heard is not None else None, entry.lost, entry.corrupt, entry.repeated]
                 for entry in picture.traffic.values()

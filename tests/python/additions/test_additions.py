@@ -236,7 +236,7 @@ def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Copy:
     )
     project.file("host_tools/lever_cdkf/report/charts/speed.py", CHART)
     page = "host_tools/lever_cdkf/report/page.py"
-    project.change(page, "import comparison, health,", "import comparison, health, speed,")
+    project.change(page, "import health,", "import health, speed,")
     section = 'page.section("speed", "Speed", "Speed", page.figure("figure-speed", speed.rate(run), "It."))'
     project.change(page, "    _health(page, run)\n", f"    {section}\n    _health(page, run)\n")
     project.change("host_tools/lever_cdkf/can/logs.py", '_CANDUMP = (".log",', '_CANDUMP = (".dump", ".log",')

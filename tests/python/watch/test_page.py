@@ -87,9 +87,9 @@ def test_a_session(desktop: Browser, start_lever: Start) -> None:
         assert drawn(desktop, canvas) > 20, canvas
     terms = "Array.from(document.querySelectorAll('#health dt'), e => [e.textContent, e.nextSibling.textContent])"
     health = dict(desktop.run(terms))
-    assert float(health["lever angle"].removesuffix(" deg")) == pytest.approx(20.0, abs=5.0)
-    assert health["choices"] == "lever, trim, dual, robbins_monro, none"
-    assert re.fullmatch(r"\d+ lost, \d+ corrupt, \d+ late, \d+ restarts", health["estimator counts"])
+    assert float(health["theta"].removesuffix(" deg")) == pytest.approx(20.0, abs=5.0)
+    assert (health["model"], health["choices"]) == ("lever", "trim, dual, robbins_monro, none")
+    assert re.fullmatch(r"\d+ lost, \d+ corrupt, \d+ late", health["counts"])
     assert health["firmware"][0].isdigit()
 
     assert desktop.run("document.querySelector('[data-request=run]').ariaPressed") == "true"
