@@ -11,7 +11,7 @@ from ..runtime.extras import missing, require
 FORMATS = {"csv": "trace.csv", "mf4": "signals.mf4", "mcap": "signals.mcap", "parquet": "trace.parquet"}
 """And their files."""
 _EXTRAS = {"mf4": ("mf4",), "mcap": ("files", "mcap"), "parquet": ("files", "pyarrow")}
-"""What a format needs: an extra, and the package of it, if not all."""
+"""The extra that a format needs, and the one package of it that is enough, if there is one."""
 _DEFAULT = "csv"
 
 

@@ -40,7 +40,7 @@ _ADVICE = {
         "connected?"
     ),
 }
-"""What to do about a failure, by words (in lower case) that the tool says of it; the first that fits."""
+"""Advice on a failure, by words (in lower case) of what the tool says; the first that fits is given."""
 
 _DESCRIPTION = """\
 Writes an image into the flash of an STM32F405 through a debug probe (SWD), verifies it, and starts it. Uses OpenOCD or

@@ -1,1 +1,1 @@
-"""What users write: quantities with units, TOML, and the nearest name to a mistyped one."""
+"""What users write and read: quantities with units, counts, TOML, and the nearest name to a mistyped one."""

@@ -11,6 +11,7 @@ import numpy as np
 from ..firmware.settings_file import Assignments, make_config
 from ..numeric.arrays import Array
 from ..results import whiteness
+from ..text.counts import counted
 from .likelihood import Likelihood, noise_as_set
 
 _BLOCK = 0.5
@@ -128,7 +129,7 @@ def verdict(results: Sequence[Fit], changed: int) -> str:
     """In a sentence or two."""
     if not changed:
         return "The log contradicts none of the settings: nothing to tune."
-    settings = f"{changed} setting{'s' if changed > 1 else ''} changed."
+    settings = f"{counted(changed, 'setting')} changed."
     gains = [
         f"{_outcome(each)} with noise {'as set' if noise == 'as set' else 'estimated while running'} ({each})"
         for noise, each in _held_out(results).items()

@@ -8,6 +8,7 @@ import numpy as np
 from lever_cdkf.firmware.aircraft import ALARM, WARNING
 from lever_cdkf.report.figure import Figure, Spec, axis, band, line, time_axis
 from lever_cdkf.report.page import Page
+from lever_cdkf.text.counts import counted
 
 from ..acceptance import acceptance_page
 from .flights import AIRCRAFT, FIVE
@@ -21,11 +22,11 @@ _LEGEND = {"orientation": "h", "x": 0, "y": 1.06, "yanchor": "bottom", "traceord
 
 def build(results: Sequence[BounceResult], seeds: int) -> str:
     """Return the whole page."""
-    pilots = "1 random pilot" if seeds == 1 else f"{seeds} random pilots"
     page = Page(
         "Collective bounce: seen coming, and how far it is held off",
-        f"{pilots} with each of {len(AIRCRAFT)} aircraft, or with {len(FIVE)} in turn where it is about "
-        f"what lies between accelerometer and pilot ({', '.join(FIVE)}), the firmware as shipped in the loop. What "
+        f"{counted(seeds, 'random pilot')} with each of {len(AIRCRAFT)} aircraft, or with {len(FIVE)} in turn "
+        f"where it is about what lies between accelerometer and pilot ({', '.join(FIVE)}), "
+        "the firmware as shipped in the loop. What "
         "limits the mitigation is that airframe and body: mount the accelerometer on the structure that carries the "
         "pilot's seat. "
         "Charts: of each condition the flight in which its first figure was worst.",

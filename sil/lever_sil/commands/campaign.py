@@ -15,6 +15,7 @@ from lever_cdkf.cli.layout import command_lines, say, terminal_width
 from lever_cdkf.cli.tables import add_json_option
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
+from lever_cdkf.text.counts import counted
 
 if TYPE_CHECKING:
     from ..campaign.chunks import Plan
@@ -118,7 +119,7 @@ def _run(plan: Plan, folder: Path, args: argparse.Namespace) -> Session:
     if done == plan.count:
         return Session()
     with connected(args.scheduler, args.workers or os.cpu_count() or 1) as client, Progress("campaign") as progress:
-        work = f"{_count(plan.spec.runs, 'run')} in {_count(plan.count, 'chunk')}"
+        work = f"{counted(plan.spec.runs, 'run')} in {counted(plan.count, 'chunk')}"
         print(f"{work}; dashboard: {dashboard(client)}", flush=True)
         return run(plan, folder, client, progress.show)
 
@@ -149,20 +150,16 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
         say(f"failed: {found['failed'] - len(errors)} more: the rows with an error")
     factor = found["real_time_factor_per_core"]
     speed = f", {factor:g} × real time a core." if factor else "."
-    say(f"{_count(found['runs'], 'run')}, {found['failed']} failed{speed}")
-    chunks = _count(len(list(folder.glob("*.parquet"))), "Parquet file")
+    say(f"{counted(found['runs'], 'run')}, {found['failed']} failed{speed}")
+    chunks = counted(len(list(folder.glob("*.parquet"))), "Parquet file")
     written = [*maps.write(plan, folder, origin), summary.FILE, chunks]
     say(f"Written to {args.out}: {', '.join(written)}")
     if session.lost:
         flights = ", ".join(f"{chunk.first} to {chunk.end - 1}" for chunk in session.lost)
-        missing = _count(plan.spec.runs - found["runs"], "run")
+        missing = counted(plan.spec.runs - found["runs"], "run")
         print(f"lever: campaign: {missing} missing: flights {flights} killed their workers", file=sys.stderr)
         return 1
     return 0
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"
 
 
 def _one(chosen: Spec, args: argparse.Namespace) -> int:

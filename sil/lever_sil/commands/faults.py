@@ -12,6 +12,7 @@ from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
 from lever_cdkf.runtime.files import json_text, make_folder, write_texts
+from lever_cdkf.text.counts import counted
 
 from .names import check_names
 
@@ -86,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
         make_folder(args.out)
     with Progress("faults") as progress:
         results = matrix.run(chosen, seeds, progress.show)
-    print_tables({f"{seeds} random pilot{'s' if seeds > 1 else ''} a fault, the worst of them": table.lines(results)})
+    print_tables({f"{counted(seeds, 'random pilot')} a fault, the worst of them": table.lines(results)})
     counts = table.counts(results)
     known = counts["missed"] - counts["unexpected"]
     said = f"{counts['count']} faults: {counts['missed']} not met as demanded ({counts['silent']} silent)"

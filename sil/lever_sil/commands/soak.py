@@ -13,6 +13,7 @@ from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
 from lever_cdkf.runtime.files import check_writable, json_text, write_texts
+from lever_cdkf.text.counts import counted
 
 from .names import seed
 
@@ -92,9 +93,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _verdict(result: SoakResult) -> str:
     total, faults = result.total, sum(result.faults.values())
-    flights = total.row()["flights"]
     return (
-        f"{flights} flight{'' if flights == 1 else 's'} of 5 min with {faults} faults: NEES "
+        f"{counted(total.row()['flights'], 'flight')} of 5 min with {faults} faults: NEES "
         f"{total.row()['NEES (expected 1)']:.2f} (expected 1), "
         f"silent errors for {total.silent_s:.0f} s, {total.counts['recoveries']} restarts of the filter, memory "
         f"{result.growth:+.1f} MiB."

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST, fault_names
 from lever_cdkf.report.page import Page
+from lever_cdkf.text.counts import counted
 
 from ..acceptance import acceptance_page
 from .run_conditions import EnvelopeResult
@@ -13,10 +14,10 @@ from .run_conditions import EnvelopeResult
 
 def build(results: Sequence[EnvelopeResult], seeds: int) -> str:
     """Return the whole page."""
-    pilots = "1 random pilot" if seeds == 1 else f"{seeds} random pilots"
     page = Page(
         "The conditions that a collective meets",
-        f"Levers and pilots by a plant that shares nothing with the filter's model, {pilots} a condition, "
+        "Levers and pilots by a plant that shares nothing with the filter's model, "
+        f"{counted(seeds, 'random pilot')} a condition, "
         "the firmware as shipped. Charts: the natural frequency with its ±2σ, of each condition in the run in which it "
         "was worst.",
         "lever envelope",

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from lever_cdkf.firmware.estimator import DO_NOT_TRUST, fault_names
 from lever_cdkf.report.page import Page
 from lever_cdkf.report.summary_html import table
+from lever_cdkf.text.counts import counted
 
 from ..measures import WRONG
 from .judge import BACK, ERROR, RIGHT, SILENT
@@ -29,7 +30,7 @@ def build(results: Sequence[RowResult], seeds: int) -> str:
     """Return the whole page."""
     page = Page(
         "Faults of bus, senders and sensors",
-        f"{seeds} random pilot{'s' if seeds > 1 else ''} a fault, the worst of them. The fault lasts from 15 to 25 s "
+        f"{counted(seeds, 'random pilot')} a fault, the worst of them. The fault lasts from 15 to 25 s "
         "of 40 s; frames pass the firmware's E2E check, and its dither moves the lever.",
         "lever faults",
     )
