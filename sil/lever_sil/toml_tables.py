@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from lever_cdkf.errors import LeverError
@@ -47,6 +48,15 @@ class Place:
         """Return an error that names file and key."""
         return ScenarioError(f"{self.file}: {self.path}: {message}" if self.path else f"{self.file}: {message}")
 
+    def check_table(self, values: Any, known: Collection[str]) -> None:
+        """Raise ScenarioError unless `values` is a table, and all its keys are known."""
+        if not isinstance(values, dict):
+            raise self.error(f"{values!r} is not a table")
+        for key in values:
+            if key not in known:
+                hint = did_you_mean(key, known, f"allowed: {', '.join(known)}")
+                raise self.error(f"unknown key {key!r}; {hint}")
+
 
 @dataclass(frozen=True)
 class Shelf:
@@ -64,14 +74,16 @@ class Shelf:
 
     def content(self, name_or_path: str) -> bytes:
         """Return the content of the file of that name or path (ending in .toml). Raise ScenarioError."""
-        if name_or_path.endswith(_ENDING):
-            if not Path(name_or_path).is_file():
-                raise ScenarioError(f"{name_or_path}: no such file")
-            return Path(name_or_path).read_bytes()
-        names = self.names()
+        path, names = Path(name_or_path), self.names()
         if name_or_path in names:
             content: bytes = (self._files() / f"{name_or_path}{_ENDING}").read_bytes()
             return content
+        if path.suffix == _ENDING and path.is_file():
+            return path.read_bytes()
+        if path.exists():
+            raise ScenarioError(f"{path} is not a {_ENDING} file: give that of a {self.kind}, or one of {', '.join(names)}")
+        if path.suffix == _ENDING:
+            raise ScenarioError(f"{path}: no such file")
         hint = did_you_mean(name_or_path, names, f"there are {', '.join(names)}, or give a path to a .toml file")
         raise ScenarioError(f"no {self.kind} {name_or_path!r}; {hint}")
 
@@ -213,9 +225,9 @@ def item(reader: Reader, signal: str | None = None, default: Any = _REQUIRED) ->
     return _field(item_reader, default)
 
 
-def read_table(kind: type[T]) -> Reader:
-    """Reader of a table into the dataclass `kind`."""
-    return lambda value, place: read(kind, value, place)
+def read_table(kind: type[T], **usual: Any) -> Reader:
+    """Reader of a table into the dataclass `kind`; `usual` are defaults that differ from those of its fields."""
+    return lambda value, place: read(kind, value, place, usual)
 
 
 def table(kind: type[T]) -> Any:
@@ -243,16 +255,12 @@ def tables(reader: Reader, signal: str | None = None) -> Any:
     return item(read_list(reader), signal, ())
 
 
-def read(kind: type[T], values: Any, place: Place) -> T:
-    """Return the dataclass `kind` from the table `values`. Raise ScenarioError."""
-    if not isinstance(values, dict):
-        raise place.error(f"{values!r} is not a table")
+def read(kind: type[T], values: Any, place: Place, usual: Mapping[str, Any] = MappingProxyType({})) -> T:
+    """Return the dataclass `kind` from the table `values`, with defaults as for read_table(). Raise ScenarioError."""
     all_fields = dataclasses.fields(kind)  # type: ignore[arg-type]
     fields = {field.name: field for field in all_fields if "read" in field.metadata}
-    for key in values:
-        if key not in fields:
-            raise place.error(f"unknown key {key!r}; allowed: {', '.join(fields)}")
-    read_values: dict[str, Any] = {}
+    place.check_table(values, fields)
+    read_values = dict(usual)
     for name, field in fields.items():
         if name in values:
             read_values[name] = field.metadata["read"](values[name], place.at(name))

@@ -11,6 +11,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
@@ -206,6 +207,11 @@ class Dropout(Window):
         return missing
 
 
+def _sensor(unit: str, noise: float) -> Any:
+    """Return a field that holds a sensor; unless its table says otherwise it has this noise."""
+    return item(read_table(Sensor, noise=noise), unit, Sensor(noise=noise))
+
+
 @dataclass(frozen=True)
 class Sensors:
     """All sensors; the defaults are the standard values.
@@ -213,10 +219,10 @@ class Sensors:
     These are 1 mrad and 10 mrad/s of noise, a fair accelerometer and torque sensor; no sensor of the grip force.
     """
 
-    theta: Sensor = item(read_table(Sensor), "rad", Sensor(noise=1e-3))
-    theta_dot: Sensor = item(read_table(Sensor), "rad/s", Sensor(noise=1e-2))
-    z_ddot: Sensor = item(read_table(Sensor), "m/s^2", Sensor(noise=0.01))
-    tau_m: Sensor = item(read_table(Sensor), "N m", Sensor(noise=2e-3))
+    theta: Sensor = _sensor("rad", 1e-3)
+    theta_dot: Sensor = _sensor("rad/s", 1e-2)
+    z_ddot: Sensor = _sensor("m/s^2", 0.01)
+    tau_m: Sensor = _sensor("N m", 2e-3)
     grip_force: Sensor | None = item(read_table(Sensor), "N", None)
     dropout: tuple[Dropout, ...] = tables(read_table(Dropout))
 

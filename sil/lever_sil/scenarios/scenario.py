@@ -25,7 +25,7 @@ from lever_cdkf.firmware.native import Config, enum_names, settings_table
 from lever_cdkf.firmware.settings_file import setting_value
 from lever_cdkf.numeric.arrays import FloatArray
 from lever_cdkf.results.trace import CONVERGED_AFTER
-from lever_cdkf.text.suggestions import did_you_mean, nearest_names
+from lever_cdkf.text.suggestions import nearest_names
 from lever_cdkf.text.toml_text import MOST_NESTED
 from lever_cdkf.text.units import UnitError
 
@@ -97,12 +97,7 @@ def _read_numbers(readers: Mapping[str, Reader]) -> Reader:
     """Reader of a table of quantities by name."""
 
     def reader(values: Any, place: Place) -> dict[str, float]:
-        if not isinstance(values, dict):
-            raise place.error(f"{values!r} is not a table")
-        for name in values:
-            if name not in readers:
-                hint = did_you_mean(name, readers, f"allowed: {', '.join(readers)}")
-                raise place.error(f"unknown key {name!r}; {hint}")
+        place.check_table(values, readers)
         return {name: readers[name](value, place.at(name)) for name, value in values.items()}
 
     return reader

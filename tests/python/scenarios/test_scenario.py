@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from lever_cdkf.firmware.config import Config
@@ -98,6 +100,12 @@ def test_settings_are_the_firmwares_but_for_overrides(load: Load) -> None:
     assert changed.true_lever.lever_length == 0.4
 
 
+@pytest.mark.parametrize(("what", "noise"), [("theta", 1e-3), ("theta_dot", 1e-2), ("z_ddot", 0.01), ("tau_m", 2e-3)])
+def test_a_sensor_keeps_the_noise_that_its_table_does_not_name(load: Load, what: str, noise: float) -> None:
+    sensor = getattr(load(LEAST, f"sensors.{what}.delay=3 ms").sensors, what)
+    assert (sensor.noise, sensor.delay) == (noise, 3e-3)
+
+
 def test_where_he_lets_go_the_lever_keeps_its_place_until_he_takes_it_again(load: Load) -> None:
     moving = 'trim = { kind = "ramp", first = "20 deg", last = "30 deg", start = "0 s", duration = "1 s" }'
     off = 'hands_off = [{ start = "0.3 s", end = "0.5 s" }, { start = "0.8 s" }]\n'
@@ -146,7 +154,7 @@ def test_overrides_replace_values_with_or_without_quotes(load: Load) -> None:
     [
         (
             LEAST.replace("k_p", "k_q"),
-            r"made.toml: pilot: unknown key 'k_q'; allowed: trim, preload, process_noise, m_p, c_p, k_p, hands_off",
+            r"made.toml: pilot: unknown key 'k_q'; did you mean k_p",
         ),
         (LEAST.replace('m_p = "3 kg"', ""), "pilot: key 'm_p' is missing"),
         (LEAST.replace('trim = "20 deg"', ""), "pilot: key 'trim' is missing"),
@@ -220,6 +228,8 @@ def test_what_is_nested_too_deeply_is_refused(load: Load, value: str) -> None:
         ("pilot.m_p.first=3 kg", "the scenario has no 'pilot.m_p.first'"),
         ("title.x=3", "the scenario has no 'title.x'"),
         ("colour=red", "^--set colour=red: unknown key 'colour'"),
+        ("durration=3", "^--set durration=3: unknown key 'durration'; did you mean duration?"),
+        ("pilot.colour=red", "pilot: unknown key 'colour'; allowed: trim, preload, process_noise, m_p, c_p, k_p, hands_off"),
         ("duration=2 h", "^--set duration=2 h: duration: '2 h' is out of range"),
         ("theta_noise=9 rad", "^--set theta_noise=9 rad: settings: theta_noise = 9.0 is out of range"),
         (
@@ -232,6 +242,13 @@ def test_what_is_nested_too_deeply_is_refused(load: Load, value: str) -> None:
 def test_a_wrong_override_is_refused(load: Load, override: str, message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         load(LEAST, "seed=3", override, "converged_after=1 s")
+
+
+def test_what_is_no_toml_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "steady.log").touch()
+    for path in (tmp_path, tmp_path / "steady.log"):
+        with pytest.raises(ScenarioError, match="is not a .toml file: give that of a scenario, or one of base_dither"):
+            scenario.load(path)
 
 
 def test_an_error_of_the_file_is_not_blamed_on_an_override(load: Load) -> None:
