@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import LeverError
 from ..runtime.extras import pip_install
+from ..text.suggestions import did_you_mean
 from .identifiers import add_identifier_options, translate_bus
 
 if TYPE_CHECKING:
@@ -92,6 +93,10 @@ def open_bus(interface: str, channel: str | None, options: Mapping[str, Any], *,
 
     from .protocol_ahead import read_ahead
 
+    if interface not in can.VALID_INTERFACES:
+        known = sorted(can.VALID_INTERFACES)
+        hint = did_you_mean(interface, known, f"there are {', '.join(known)}")
+        raise LeverError(f"no interface {interface!r}; {hint}")
     package = _PACKAGES.get(interface)
     if package is not None and importlib.util.find_spec(package) is None:
         raise LeverError(f"interface {interface} needs the Python package {package}: {pip_install(package)}")

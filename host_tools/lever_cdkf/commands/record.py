@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
 
     out = args.out or Path(time.strftime("lever_%Y%m%d_%H%M%S.log"))
     if args.interface is None:
-        raise LeverError("record what? give a bus such as --interface socketcan --channel can0")
+        raise LeverError("no bus given: name one, such as --interface socketcan --channel can0")
     check_others_can_be_heard(args.interface)
     reading, fd = _reading(args)
     options = chosen_options(args, fd=fd)

@@ -109,7 +109,8 @@ def make_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise LeverError(f"cannot make the folder {folder}: {error.strerror}") from None
+        why = "there is a file of that name" if folder.is_file() else error.strerror
+        raise LeverError(f"cannot make the folder {folder}: {why}") from None
 
 
 @contextmanager

@@ -187,7 +187,7 @@ def test_on_a_quiet_bus_it_asks_ten_times_a_second_whether_to_end(
 
 @pytest.mark.parametrize(
     ("arguments", "text"),
-    [((), "record what? give a bus such as "), (("--interface", "kvaser", "--duration", "0"), "--duration")],
+    [((), "no bus given: name one, such as "), (("--interface", "kvaser", "--duration", "0"), "--duration")],
 )
 def test_bad_input_is_one_line(arguments: tuple[str, ...], text: str, tmp_path: Path, refused: Refused) -> None:
     assert text in refused("record", "-o", tmp_path / "a.log", *arguments)

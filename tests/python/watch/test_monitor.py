@@ -190,6 +190,7 @@ def test_once_of_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
         (["--once", "no.log"], "cannot read no.log: No such file or directory"),
         (["--once", "--scenario", "xyz"], "no scenario 'xyz'; there are "),
         (["--once", "--interface", "lever"], "interface lever stays inside one process, "),
+        (["--once", "--interface", "sockcan"], "no interface 'sockcan'; did you mean socketcan?"),
         (["--once", "--interface", "socketcan", "--channel", "no0"], "cannot open socketcan channel no0: "),
         (["--once", "--interface", "slcan", "--bus-option", "x"], "--bus-option x: must be KEY=VALUE"),
         (["--duration", "soon"], "'soon' is not a number of seconds above 0"),
