@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -37,7 +38,7 @@ class Replayed:
 
     log: str
     name: str
-    """Shown: the end of its path that no other log has."""
+    """In the table, on the page, and of its folder: the end of its path that no other log has."""
     summary: ReplaySummary | None = None
     """None where it could not be replayed."""
     problem: str = ""
@@ -69,15 +70,15 @@ class Replayed:
 def replay_each(
     logs: Sequence[str], options_of: Callable[[str], Options], out: Path | None, progress: Progress | None = None
 ) -> list[Replayed]:
-    """Replay each log; with `out`, its files are in a folder of it that is called as the log is.
+    """Replay each log; with `out`, its files are in a folder of it that has the name of the log in the table.
 
     What is wrong with a log is its row's `problem`, and the others go on.
     """
     replays = []
-    for log, name, folder in zip(logs, _names(logs), _folders(logs), strict=True):
+    for log, name in zip(logs, _names(logs), strict=True):
         each = Replayed(log, name)
         try:
-            each.summary = replay([log], options_of(log), None if out is None else out / folder, progress, each.keep)
+            each.summary = replay([log], options_of(log), None if out is None else out / name, progress, each.keep)
             failed = failure(each.summary)
             each.failed, each.problem = bool(failed), failed or incomplete(each.summary.recording)
         except LeverError as error:
@@ -111,29 +112,15 @@ def write(replays: Sequence[Replayed], out: Path, inputs: Sequence[str]) -> list
 
 
 def _names(logs: Sequence[str]) -> list[str]:
-    """Return for each the shortest end of its path that no other has."""
-    paths = [Path(log).parts for log in logs]
-
-    def name(index: int) -> str:
-        own, others = paths[index], paths[:index] + paths[index + 1 :]
-        for count in range(1, len(own)):
-            if all(other[-count:] != own[-count:] for other in others):
-                return str(Path(*own[-count:]))
-        return logs[index]
-
-    return [name(index) for index in range(len(paths))]
-
-
-def _folders(logs: Sequence[str]) -> list[str]:
-    """Return a name for each: that of the log without its ending, and a number where another has it."""
+    """Return for each the shortest end of its path that no other has; with a number where the same log is repeated."""
+    paths = [Path(os.path.abspath(log)).parts[1:] for log in logs]
     names: list[str] = []
-    for log in logs:
-        stem = Path(log.removesuffix(".gz")).stem
-        number = 2
-        name = stem
-        while name in names:
-            name, number = f"{stem}_{number}", number + 1
-        names.append(name)
+    for index, own in enumerate(paths):
+        others = {other for other in paths if other != own}
+        ends = (own[-count:] for count in range(1, len(own)))
+        end = next((end for end in ends if all(other[-len(end) :] != end for other in others)), own)
+        before = paths[:index].count(own)
+        names.append(f"{Path(*end)}_{before + 1}" if before else str(Path(*end)))
     return names
 
 

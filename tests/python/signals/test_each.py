@@ -25,7 +25,7 @@ def test_a_row_for_each(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     assert [bool(row["problem"]) for row in rows] == [False, True, False]
     assert rows[0]["natural_frequency [Hz]"] == rows[2]["natural_frequency [Hz]"]
     assert rows[0]["natural_frequency [Hz]"] == pytest.approx(NATURAL_FREQUENCY, rel=0.03)
-    assert sorted(os.listdir(tmp_path / "out")) == ["flight", "flight_2", "logs.parquet", "overlay.html"]
+    assert sorted(os.listdir(tmp_path / "out")) == ["flight.blf", "flight.log", "logs.parquet", "overlay.html"]
     table = parquet.read_table(tmp_path / "out/logs.parquet").to_pylist()
     assert table == rows
     drawn = figures(read(tmp_path / "out/overlay.html"))["overlay"]["data"]
@@ -45,6 +45,7 @@ def test_a_log_that_is_cut_off_or_called_as_another_is_told_apart(folder: Path, 
     assert [row["log"] for row in rows] == [str(Path("A/bus.log")), str(Path("B/bus.log"))]
     assert rows[0]["problem"] == ""
     assert rows[1]["problem"].startswith("The log is incomplete: bus.log: ")
+    assert all((tmp_path / "out" / row["log"] / "report.html").exists() for row in rows)
     page = (tmp_path / "out/overlay.html").read_text()
     assert "1 of 2 logs has a problem." in page
     assert '<span class="words">The log is incomplete: ' in page
