@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     from ..cli.tables import print_tables
     from ..replay.engine import replay
     from ..replay.outputs import FILES
-    from ..replay.summary import failure
+    from ..replay.summary import failure, incomplete
 
     check_not_input(args.json, args.logs)
     if args.each:
@@ -103,6 +103,8 @@ def run(args: argparse.Namespace) -> int:
     say(summary.verdict)
     if args.out is not None:
         say(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
+    if said := incomplete(summary.recording):
+        print(f"lever: warning: {said}", file=sys.stderr)
     if not summary.passed:
         print(f"lever: replay: {failure(summary)}", file=sys.stderr)
     return 0 if summary.passed else 1

@@ -114,8 +114,7 @@ def run_monitor(args: argparse.Namespace) -> int:
         from ..watch.terminal import Monitor
 
         Monitor(source, args.duration).run()
-    if source.error is not None:
-        raise LeverError(source.error)
+    source.check()
     return 0
 
 

@@ -74,8 +74,9 @@ def read(
     if reading.channel is None and traffic.other_samples:
         buses = " or --channel ".join(sorted({str(traffic.channel), *traffic.other_samples}))
         raise LeverError(f"{name}: samples on more than one bus: choose by --channel {buses}")
-    notes = tuple(traffic.loaded.notes) if isinstance(traffic, MappedFrames) else ()
-    return replace(_recording(np.concatenate(pieces), str(traffic.channel), name), notes=notes)
+    notes = [f"the log is incomplete: {reason}" for reason in log.ends_early]
+    notes += traffic.loaded.notes if isinstance(traffic, MappedFrames) else ()
+    return replace(_recording(np.concatenate(pieces), str(traffic.channel), name), notes=tuple(notes))
 
 
 def _recording(frames: Array, bus: str, log: str) -> Recording:

@@ -277,8 +277,7 @@ def serve(
     interrupted = asyncio.run(_until_stopped(server, duration))
     if interrupted:
         raise KeyboardInterrupt
-    if source.error is not None:
-        raise LeverError(source.error)
+    source.check()
 
 
 async def _until_stopped(server: Server, duration: float | None) -> bool:

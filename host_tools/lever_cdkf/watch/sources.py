@@ -65,6 +65,8 @@ class Source(ABC):
         """Whether no more will come, though nobody has called stop()."""
         self.error: str | None = None
         """Why not, when something went wrong."""
+        self.warning: str | None = None
+        """What is wrong with a part of it; the rest is used."""
         self._waiting: deque[Frame] = deque(maxlen=MOST_WAITING)
         self._start = time.monotonic()
         self._switch_interval: float | None = None  # of before start()
@@ -89,6 +91,13 @@ class Source(ABC):
         sys.setswitchinterval(_SWITCH_INTERVAL)
         self._start = time.monotonic()
         self._thread.start()
+
+    def check(self) -> None:
+        """Print its warning to standard error. Raise LeverError for its error."""
+        if self.warning is not None:
+            print(f"lever: warning: {self.warning}", file=sys.stderr)
+        if self.error is not None:
+            raise LeverError(self.error)
 
     def stop(self) -> None:
         """End the thread and release what it used; may be called again."""
@@ -235,7 +244,7 @@ class PlayedLog(Protocol):
 
 
 class LogSource(Source):
-    """A recorded log; `channel` chooses among several in it. What is wrong in it is told in `error` at its end."""
+    """A recorded log; `channel` chooses among several in it. What of it cannot be read is a `warning` at its end."""
 
     def __init__(
         self,
@@ -304,9 +313,9 @@ class LogSource(Source):
             what = "in the part from --start on" if self._channel is None else f"of channel {self._channel} in it"
             raise LeverError(f"{self.title}: no CAN frame {what}")
         if self._log.damaged:
-            self.error = f"{self.title}: {self._log.damaged} lines of it are not frames"
+            self.warning = f"{self.title}: {self._log.damaged} lines of it are not frames"
         if self._log.ends_early:
-            self.error = self._log.ends_early[-1]
+            self.warning = f"the log is incomplete: {self._log.ends_early[-1]}"
 
 
 def as_frame(message: can.Message) -> Frame:

@@ -6,6 +6,7 @@ import csv
 import hashlib
 import json
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -22,7 +23,7 @@ from lever_cdkf.replay import engine, reduction
 from lever_cdkf.replay.outputs import FILES
 from lever_cdkf.replay.summary import verdict
 from lever_cdkf.results.summary import ReplaySummary, of
-from python.conftest import Refused, Session, simulated
+from python.conftest import Refused, Run, Session, simulated
 from python.report.reading import figures, first_number, read, unpack
 
 Summary = dict[str, Any]
@@ -158,6 +159,16 @@ def test_other_traffic_and_doubled_frames_change_no_estimate(session: Session, t
     )
     parameters = [(i, d) for i, d in estimates(tmp_path / "out/bus.log") if i in ("210", "211", "212", "213")]
     assert parameters == [(i, d) for i, d in estimates(session.log) if i in ("210", "211", "212", "213")]
+
+
+@pytest.mark.parametrize("command", [("replay",), ("monitor", "--once")])
+def test_a_log_that_is_cut_off_is_used_with_a_warning(
+    command: tuple[str, ...], session: Session, lever: Run, tmp_path: Path
+) -> None:
+    (tmp_path / "cut.log").write_bytes(session.log.read_bytes()[:200_017])
+    status, _, err = lever(*command, tmp_path / "cut.log")
+    assert status == 0
+    assert re.fullmatch(r"lever: warning: [Tt]he log is incomplete: .*cut.log: its last line has no end\.?\n", err)
 
 
 def test_gaps_and_restarts_are_told(session: Session, tmp_path: Path) -> None:
