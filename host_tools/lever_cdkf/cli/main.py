@@ -10,9 +10,8 @@ import io
 import os
 import re
 import sys
-import tempfile
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -20,7 +19,7 @@ from ..errors import LeverError
 from ..runtime import interrupts
 from ..runtime.exit_status import INTERRUPTED, MESSAGE
 from ..runtime.extras import hide_mf4, reveal_mf4
-from ..runtime.files import check_writable
+from ..runtime.files import STANDARD_OUTPUT, check_writable, prints_aside
 from ..runtime.provenance import version
 from ..text.suggestions import did_you_mean
 from .help_text import HelpFormatter
@@ -126,7 +125,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             _check_json(args)
             if (prepare := getattr(args, "prepare", None)) is not None:
                 prepare(args)
-            with interrupts.heard(), _json_printed(args):
+            with interrupts.heard(), prints_aside() if getattr(args, "json", None) == STANDARD_OUTPUT else nullcontext():
                 status: int = args.run(args) or 0
         except SystemExit as stop:  # --help and --version
             status = int(stop.code or 0)
@@ -167,24 +166,10 @@ def _has_streams() -> bool:
 def _check_json(args: argparse.Namespace) -> None:
     """Before a command has worked for --json FILE; a folder that it makes itself, by --out, need not be there yet."""
     path, out = getattr(args, "json", None), getattr(args, "out", None)
-    if path not in (None, "-"):
+    if path is not None:
         folders = () if out is None else (Path(out).absolute(), *Path(out).absolute().parents)
         if Path(path).absolute().parent not in folders or Path(path).parent.exists():
             check_writable(path)
-
-
-@contextmanager
-def _json_printed(args: argparse.Namespace) -> Iterator[None]:
-    """With --json -, write JSON to standard output, and to standard error what is printed besides."""
-    if getattr(args, "json", None) != "-":
-        yield
-        return
-    with tempfile.TemporaryDirectory() as folder:
-        args.json = str(Path(folder) / "standard output")
-        with redirect_stdout(sys.stderr):
-            yield
-        if Path(args.json).exists():
-            sys.stdout.write(Path(args.json).read_text(encoding="utf-8"))
 
 
 def _said(error: Exception) -> str:

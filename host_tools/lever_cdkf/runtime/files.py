@@ -8,9 +8,9 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import lever_cdkf
 
@@ -19,6 +19,8 @@ from . import interrupts
 
 LIBRARY_DIR = "LEVER_CDKF_LIBRARY_DIR"
 """Environment variable for development: folders (separated like PATH) that are searched before the installed files."""
+STANDARD_OUTPUT = "-"
+_output: TextIO | None = None  # standard output, inside prints_aside()
 
 
 def native_file(name: str) -> Path:
@@ -53,6 +55,18 @@ def shared_library(name: str) -> str:
     return {"darwin": f"lib{name}.dylib", "win32": f"{name}.dll"}.get(sys.platform, f"lib{name}.so")
 
 
+@contextmanager
+def prints_aside() -> Iterator[None]:
+    """Inside, what is printed goes to standard error, and the text of the file "-" to standard output."""
+    global _output
+    _output = sys.stdout
+    try:
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        _output = None
+
+
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write `text` as UTF-8, as whole() does. Raise LeverError."""
     write_texts({Path(path): text})
@@ -67,14 +81,19 @@ def write_texts(texts: Mapping[Path, str]) -> None:
     """Write files, all or none, but for what fails when all are written. Raise LeverError."""
     with ExitStack() as stack:
         for path, text in texts.items():
+            if _output is not None and str(path) == STANDARD_OUTPUT:
+                _output.write(text)
+                continue
             target = stack.enter_context(whole(path))
             with writing(path):
                 target.write_text(text, encoding="utf-8")
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raise LeverError where whole() could not write: before work that would be lost."""
+    """Raise LeverError where whole() could not write: before work that would be lost. "-" is standard output."""
     final = Path(path)
+    if str(path) == STANDARD_OUTPUT:
+        return
     if final.is_dir():
         raise LeverError(f"cannot write {path}: it is a folder")
     if final.is_file() or not final.exists():

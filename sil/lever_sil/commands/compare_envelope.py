@@ -39,7 +39,6 @@ def run(args: argparse.Namespace) -> int:
         say(sentence)
     if args.json is not None:
         write_json(args.json, {"peers": tables.rows(results)})
-        say(f"Written: {args.json}")
     return 0
 
 

@@ -102,7 +102,11 @@ def test_json_goes_to_standard_output_and_all_else_to_standard_error(
     assert status == 0
     assert json.loads(out)["settings"][0]["name"] == "model"
     assert "k_p_walk" in err
-    assert not list(tmp_path.iterdir())
+    status, out, err = lever("faults", "--only", "lever_flip_0", "--seeds", "1", "--out", "page", "--json", "-")
+    assert status == 0
+    assert [row["name"] for row in json.loads(out)["rows"]] == ["lever_flip_0"]
+    assert err.endswith("Written to page: faults.html\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["page"]
 
 
 def test_a_folder_without_a_name_is_refused(tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
