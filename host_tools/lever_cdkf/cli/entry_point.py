@@ -3,14 +3,17 @@
 Ctrl-C ends it in one line before Python has read the rest, which takes a moment, and does nothing any more once all is
 done: while Python ends, it would be a signal that kills.
 
-Imports next to nothing, for the same reason.
+Imports next to nothing, for the same reason. Ctrl-C in the 15 ms before that is Python's own: a traceback.
 """
+
+import sys
 
 try:
     import signal
 
     from ..runtime.exit_status import exit_at_once
 except KeyboardInterrupt:
+    sys.stderr.write("lever: interrupted\n")
     raise SystemExit(130) from None
 
 

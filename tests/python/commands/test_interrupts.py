@@ -107,13 +107,14 @@ def test_what_fails_after_a_lost_one_is_not_told(
     interrupts.check()
 
 
-def test_it_is_heard_while_the_command_is_still_being_read() -> None:
-    """Ctrl-C while `lever` imports what it needs."""
+@pytest.mark.parametrize("name", ["lever_cdkf.runtime.exit_status", "argparse"])
+def test_it_is_heard_while_the_command_is_still_being_read(name: str) -> None:
+    """Ctrl-C while `lever` imports what it needs, the first module and others."""
     program = (
         "import signal, sys\n"
         "class Finder:\n"
         "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'argparse': signal.raise_signal(signal.SIGINT)\n"
+        f"        if name == {name!r}: signal.raise_signal(signal.SIGINT)\n"
         "sys.meta_path.insert(0, Finder())\n"
         "from lever_cdkf.cli.entry_point import main\n"
         "sys.exit(main())\n"
