@@ -20,6 +20,7 @@ from lever_cdkf.runtime.files import native_file, shared_library, whole
 from . import figures
 from .entrants import ENTRANTS
 from .runs import rows
+from .spec import FILE as SPEC
 from .spec import Spec
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 WORK = 1.0
 """Processor time that a chunk is meant to take [s]: far above the 1 ms that Dask costs a task, and little to lose."""
 
+SUMMARY = "summary.json"
+_REMEDY = "give another folder"
 _NAME = re.compile(r"([0-9a-f]{16})-(\d{10})-(\d{10})\.parquet")
 _LIBRARIES = ("lever_cdkf", "lever_loop", "lever_bulk")
 
@@ -67,17 +70,21 @@ class Plan:
         return (chunk.end - chunk.first) * len(self.spec.estimators)
 
     def done(self, folder: Path) -> set[int]:
-        """Return numbers of the chunks whose files are there and whole. Raise LeverError when another campaign is."""
+        """Return numbers of the chunks whose files are there and whole.
+
+        Raise LeverError when files of another campaign, or another command, are there.
+        """
         numbers = set()
+        for name in (SPEC, SUMMARY):
+            if (folder / name).exists() and not self.spec.is_kept_in(folder):
+                raise LeverError(f"{folder} holds another campaign, or another command's run ({name}): {_REMEDY}")
         for file in _listed(folder):
             match = _NAME.fullmatch(file.name)
             if match is None or match[1] != self.fingerprint:
-                raise LeverError(
-                    f"{folder} holds another campaign, or one of another build ({file.name}): give another folder"
-                )
+                raise LeverError(f"{folder} holds another campaign, or one of another build ({file.name}): {_REMEDY}")
             number, rest = divmod(int(match[2]), self.size)
             if rest or file.name != self.chunk(number).name(self.fingerprint):
-                raise LeverError(f"{folder} holds chunks of another size ({file.name}): give another folder")
+                raise LeverError(f"{folder} holds chunks of another size ({file.name}): {_REMEDY}")
             if _rows_in(file) == self.runs(self.chunk(number)):
                 numbers.add(number)
         return numbers

@@ -237,6 +237,13 @@ class Spec:
         written = json.dumps(values, sort_keys=True).encode()
         return hashlib.sha256(written + b"\0" + self.content).hexdigest()
 
+    def is_kept_in(self, folder: Path) -> bool:
+        """Return whether save() has put a spec of the same rows there."""
+        try:
+            return saved(folder).hashed == self.hashed
+        except ScenarioError:
+            return False
+
 
 def load(name_or_path: str) -> Spec:
     """Return the spec of that name, or in the file of that path (ending in .toml). Raise ScenarioError."""

@@ -12,13 +12,12 @@ import numpy as np
 from lever_cdkf.cli.tables import Cell, Row
 from lever_cdkf.firmware.quantities import quantities
 
-from .chunks import Plan
+from .chunks import SUMMARY, Plan
 from .session import Session
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-FILE = "summary.json"
 _SHOWN_ERRORS = 5
 
 
@@ -66,10 +65,10 @@ def _factor(plan: Plan, folder: Path, session: Session) -> float | None:
     if session.seconds > 0.0:
         return round(60.0 * plan.minutes * session.runs / session.seconds, 1)
     try:
-        before = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        before: dict[str, float | None] = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    return before.get("real_time_factor_per_core") if before.get("campaign") == plan.fingerprint else None
+    return before.get("real_time_factor_per_core")
 
 
 def errors(folder: Path) -> list[Row]:

@@ -131,6 +131,7 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
     from lever_cdkf.runtime.provenance import provenance
 
     from ..campaign import maps, summary
+    from ..campaign.chunks import SUMMARY
 
     if len(session.lost) == plan.count:
         raise LeverError(
@@ -141,7 +142,7 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
     origin = provenance([plan.spec.file] if args.spec == plan.spec.file else [])
     found = summary.build(plan, folder, session) | {"provenance": asdict(origin)}
     print_tables({plan.spec.title: summary.by_estimator(plan, folder)}, args.json)
-    write_text(folder / summary.FILE, json.dumps(found, indent=2, allow_nan=False) + "\n")
+    write_text(folder / SUMMARY, json.dumps(found, indent=2, allow_nan=False) + "\n")
     errors = summary.errors(folder)
     for row in errors:
         alone = shlex.join(["lever", "campaign", args.spec, "--run", str(row["run"])])
@@ -152,7 +153,7 @@ def _finish(plan: Plan, folder: Path, session: Session, args: argparse.Namespace
     speed = f", {factor:g} × real time a core." if factor else "."
     say(f"{counted(found['runs'], 'run')}, {found['failed']} failed{speed}")
     chunks = counted(len(list(folder.glob("*.parquet"))), "Parquet file")
-    written = [*maps.write(plan, folder, origin), summary.FILE, chunks]
+    written = [*maps.write(plan, folder, origin), SUMMARY, chunks]
     say(f"Written to {args.out}: {', '.join(written)}")
     if session.lost:
         flights = ", ".join(f"{chunk.first} to {chunk.end - 1}" for chunk in session.lost)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shlex
 from pathlib import Path
@@ -40,11 +41,10 @@ def test_a_campaign_that_is_done_is_only_summed_up(lever: Run, small_file: Path,
 
 
 def test_the_speed_is_kept_when_nothing_is_left_to_do(lever: Run, small: Plan, small_file: Path, done: Path) -> None:
-    for campaign, expected in ((small.fingerprint, 1234.5), ("another", None)):
-        before = {"campaign": campaign, "real_time_factor_per_core": 1234.5}
-        (done / "summary.json").write_text(json.dumps(before))
-        assert lever("campaign", small_file, "-o", done, "--resume")[0] == 0
-        assert json.loads((done / "summary.json").read_text())["real_time_factor_per_core"] == expected
+    spec.save(small.spec, done)
+    (done / "summary.json").write_text('{"real_time_factor_per_core": 1234.5}')
+    assert lever("campaign", small_file, "-o", done, "--resume")[0] == 0
+    assert json.loads((done / "summary.json").read_text())["real_time_factor_per_core"] == 1234.5
 
 
 def test_a_run_alone_is_printed_with_the_command_that_shows_it(lever: Run, small_file: Path, tmp_path: Path) -> None:
@@ -126,6 +126,20 @@ def test_refused(
     monkeypatch.chdir(tmp_path)
     assert says in refused("campaign", *arguments)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("other", ["a run of lever sim", "another campaign"])
+def test_a_folder_of_something_else_is_refused_and_left_alone(
+    refused: Refused, small: Plan, small_file: Path, tmp_path: Path, other: str
+) -> None:
+    if other == "another campaign":
+        written = small.spec.written.replace(b"seeds = 4", b"seeds = 5")
+        spec.save(dataclasses.replace(small.spec, written=written), tmp_path)
+    else:
+        (tmp_path / "summary.json").write_text('{"schema": 1}')
+    ((path, before),) = [(path, path.read_text()) for path in tmp_path.iterdir()]
+    assert f"({path.name}): give another folder" in refused("campaign", small_file, "-o", tmp_path)
+    assert [(path, path.read_text()) for path in tmp_path.iterdir()] == [(path, before)]
 
 
 def test_without_resume_what_is_there_is_left_alone(refused: Refused, small_file: Path, done: Path) -> None:
