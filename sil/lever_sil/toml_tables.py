@@ -81,7 +81,9 @@ class Shelf:
         if path.suffix == _ENDING and path.is_file():
             return path.read_bytes()
         if path.exists():
-            raise ScenarioError(f"{path} is not a {_ENDING} file: give that of a {self.kind}, or one of {', '.join(names)}")
+            raise ScenarioError(
+                f"{path} is not a {_ENDING} file: give that of a {self.kind}, or one of {', '.join(names)}"
+            )
         if path.suffix == _ENDING:
             raise ScenarioError(f"{path}: no such file")
         hint = did_you_mean(name_or_path, names, f"there are {', '.join(names)}, or give a path to a .toml file")

@@ -125,7 +125,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             _check_json(args)
             if (prepare := getattr(args, "prepare", None)) is not None:
                 prepare(args)
-            with interrupts.heard(), prints_aside() if getattr(args, "json", None) == STANDARD_OUTPUT else nullcontext():
+            with (
+                interrupts.heard(),
+                prints_aside() if getattr(args, "json", None) == STANDARD_OUTPUT else nullcontext(),
+            ):
                 status: int = args.run(args) or 0
         except SystemExit as stop:  # --help and --version
             status = int(stop.code or 0)

@@ -5,6 +5,7 @@ Names and units of the parameters are the firmware's; all that shows them (trace
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from functools import cache
@@ -45,6 +46,11 @@ class Quantity:
     """As HTML."""
     signed: bool = False
     """Whether it may be negative."""
+
+    @property
+    def least(self) -> float:
+        """Its physical bound."""
+        return -math.inf if self.signed else 0.0
 
     @property
     def shown_unit(self) -> str:

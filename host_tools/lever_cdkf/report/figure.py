@@ -40,6 +40,13 @@ def dots(x: Array, y: Array, name: str, colour: str, row: int = 0, **more: Any) 
     return _trace(x, y, name, row) | {"mode": "markers", "marker": marker} | more
 
 
+def edges(
+    value: Array, sigma: Array, least: float = -math.inf, most: float = math.inf, sigmas: float = 2.0
+) -> tuple[Array, Array]:
+    """Return the edges of the band of ± `sigmas` standard deviations, cut off at the least and most that can be."""
+    return np.clip(value - sigmas * sigma, least, most), np.clip(value + sigmas * sigma, least, most)
+
+
 def band(x: Array, low: Array, high: Array, name: str, colour: str, row: int = 0) -> list[Spec]:
     """Return the area between two curves: a pair of traces for each stretch without NaN in either."""
     edge = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,8 @@ class Estimated:
     values: FloatArray
     sigma: FloatArray
     """Standard deviation."""
+    least: float = -math.inf
+    """Its physical bound."""
 
     @property
     def last(self) -> float:
@@ -87,18 +90,19 @@ class Result(Mapping[str, Estimated]):
     def _by_name(self) -> dict[str, Estimated]:
         raw, usable = self._raw, ~np.isin(self.mode, ("init", "align", "fault"))
 
-        def at_samples(name: str, unit: str, values: Any, sigma: Any) -> Estimated:
+        def at_samples(name: str, unit: str, values: Any, sigma: Any, least: float = -math.inf) -> Estimated:
             usable_values, usable_sigma = (
                 np.where(usable, each.astype(np.float64), np.nan) for each in (values, sigma)
             )
-            return Estimated(name, unit, usable_values, usable_sigma)
+            return Estimated(name, unit, usable_values, usable_sigma, least)
 
         model = self.config.choices["model"]
         estimated = {}
         for k, each in enumerate(parameters(model)):
-            estimated[each.key] = at_samples(each.key, each.unit, raw["parameter"][:, k], raw["parameter_sigma"][:, k])
+            columns = raw["parameter"][:, k], raw["parameter_sigma"][:, k]
+            estimated[each.key] = at_samples(each.key, each.unit, *columns, each.least)
         for each in DYNAMICS:
-            estimated[each.key] = at_samples(each.key, each.unit, raw[each.key], raw[f"{each.key}_sigma"])
+            estimated[each.key] = at_samples(each.key, each.unit, raw[each.key], raw[f"{each.key}_sigma"], each.least)
         for name, unit in (("theta", "rad"), ("theta_dot", "rad/s")):
             estimated[name] = at_samples(name, unit, raw[name], raw[f"{name}_sigma"])
         return estimated
@@ -199,12 +203,13 @@ class Result(Mapping[str, Estimated]):
             raise LeverError(f"cannot write {path}: a plot may be .{', .'.join(pictures.KINDS)}")
         at = slice(None, None, max(1, len(self.time) // _MOST_POINTS))
         shown = {
-            name: Estimated(name, each.unit, each.values[at], each.sigma[at])
+            name: replace(each, values=each.values[at], sigma=each.sigma[at])
             for name, each in self._estimated.items()
             if name not in _STATES
         }
         described = result_plot.figure(self.time[at], list(shown.values())).spec()
-        figure = printed.charts([("", described)], _ROW * len(shown), width)
+        title = "{model} model, {estimator} estimator".format_map(self.config.choices)
+        figure = printed.charts([(title, described)], 0.5 + _ROW * len(shown), width)
         if path is not None and kind is not None:
             content = pictures.render(figure, kind, self._heading(), provenance(), estimator=self._estimator())
             with whole(path) as target:

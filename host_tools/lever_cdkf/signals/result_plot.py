@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..numeric.arrays import FloatArray
-from ..report.figure import Figure, Spec, axis, band, line, time_axis
+from ..report.figure import Figure, Spec, axis, band, edges, line, time_axis
 
 if TYPE_CHECKING:
     from .result import Estimated
@@ -19,11 +19,10 @@ _USUAL = (1.0, 99.0)  # percentiles of the values that an axis shows
 def figure(time: FloatArray, shown: Sequence[Estimated]) -> Figure:
     """Return a chart for each quantity with its band of ±2 sigma."""
     drawn = Figure([_axis(each) for each in shown], time_axis(float(time[-1])))
-    drawn.more["showlegend"] = False
     for row, each in enumerate(shown):
-        around = (each.values - 2.0 * each.sigma, each.values + 2.0 * each.sigma)
-        drawn.add(*band(time, *around, "±2 sigma", "estimate-band", row))
-        drawn.add(line(time, each.values, each.name, "estimate", row))
+        around = edges(each.values, each.sigma, each.least)
+        drawn.add(*band(time, *around, "estimate ± 2 standard deviations", "estimate-band", row))
+        drawn.add(line(time, each.values, "estimate", "estimate", row))
     return drawn
 
 
@@ -34,7 +33,7 @@ def _axis(each: Estimated) -> Spec:
         return axis(title)
     low, high = np.percentile(finite, _USUAL)
     room = max(0.5 * float(high - low), 4.0 * each.last_sigma, 1e-9)
-    return axis(title, range=[float(low) - room, float(high) + room])
+    return axis(title, range=[max(float(low) - room, each.least), float(high) + room])
 
 
 def table(time: FloatArray, shown: Sequence[Estimated]) -> str:

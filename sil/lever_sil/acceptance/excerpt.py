@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from lever_cdkf.numeric.arrays import BoolArray, FloatArray
-from lever_cdkf.report.figure import Figure, axis, band, dots, line, time_axis
+from lever_cdkf.report.figure import Figure, axis, band, dots, edges, line, time_axis
 
 _MARGIN = 0.15  # of the y axis, beyond what 98 % of the values reach
 _NO_TRUTH = 2.0  # [Hz] of f_n: what is below is the lever alone, without an arm
@@ -40,8 +40,8 @@ class Excerpt:
         figure = Figure(
             [axis(TITLES[self.quantity], range=[floor, ceiling])], time_axis(float(self.time[-1])), height=260
         )
-        low, high = self.value - sigmas * self.sigma, self.value + sigmas * self.sigma
-        figure.add(*band(self.time, low, high, f"estimate ±{sigmas:g}σ", "estimate-band"))
+        around = edges(self.value, self.sigma, 0.0, sigmas=sigmas)
+        figure.add(*band(self.time, *around, f"estimate ± {sigmas:g}σ", "estimate-band"))
         if self.truth.size:
             figure.add(line(self.time, self.truth, "truth", "truth", line_dash="dash", zorder=1))
         figure.add(line(self.time, self.value, "estimate", "estimate"))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from lever_cdkf.firmware.aircraft import ALARM, WARNING
-from lever_cdkf.report.figure import Figure, Spec, axis, band, line, time_axis
+from lever_cdkf.report.figure import Figure, Spec, axis, band, edges, line, time_axis
 from lever_cdkf.report.page import Page
 from lever_cdkf.text.counts import counted
 
@@ -44,8 +44,7 @@ def _chart(shown: Excerpt, flight: str) -> Figure:
     rows = [axis("margin [dB]", range=[-5.0, _MOST], weight=1.5), axis("lever [°]"), axis("cabin [m/s²]")]
     figure = Figure(rows, time_axis(float(shown.time[-1])), height=480)
     margin = np.minimum(shown.margin, _MOST)
-    low, high = margin - 2.0 * shown.sigma, np.minimum(margin + 2.0 * shown.sigma, _MOST)
-    figure.add(*band(shown.time, low, high, "estimate ±2σ", "estimate-band"))
+    figure.add(*band(shown.time, *edges(margin, shown.sigma, most=_MOST), "estimate ± 2σ", "estimate-band"))
     figure.add(
         line(shown.time, np.minimum(shown.true, _MOST), f"truth ({flight})", "truth", line_dash="dash", zorder=1)
     )

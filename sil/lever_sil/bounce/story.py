@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from lever_cdkf.firmware.library import lib
-from lever_cdkf.report.figure import Figure, Spec, axis, band, hover, line, time_axis
+from lever_cdkf.report.figure import Figure, Spec, axis, band, edges, hover, line, time_axis
 from lever_cdkf.report.page import Story
 from lever_cdkf.text.units import GRAVITY
 
@@ -37,7 +37,7 @@ def tell() -> Story:
     figure = Figure(rows, time_axis(plan.duration), height=620)
     time, said = mitigated.notes[::5], mitigated.stability[::5]
     margin, sigma = (np.minimum(said[name], _MOST) for name in ("gain_margin", "gain_margin_sigma"))
-    figure.add(*band(time, margin - 2.0 * sigma, np.minimum(margin + 2.0 * sigma, _MOST), "±2σ", "estimate-band"))
+    figure.add(*band(time, *edges(margin, sigma, most=_MOST), "estimate ± 2σ", "estimate-band"))
     true = np.minimum(mitigated.margins(5), _MOST)
     look: Spec = {"line_dash": "dash", "zorder": 1}
     figure.add(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ import pytest
 import xarray as xr
 from lever_cdkf import Config, Result, estimate, run_samples
 from lever_cdkf.errors import LeverError
+from lever_cdkf.report.printed import values
+from lever_cdkf.signals import result_plot
 from PIL import Image
 from pyarrow import parquet
 from python.signals.flight import GRAVITY, NATURAL_FREQUENCY, Flight, fly
@@ -221,6 +224,19 @@ def test_the_plot_shows_the_last_estimates(result: Result) -> None:
     ]
     low, high = figure.axes[3].get_ylim()
     assert low < NATURAL_FREQUENCY < high
+    assert figure.axes[0].get_title() == "lever model, dual estimator"
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "estimate ± 2 standard deviations", "estimate"
+    ]  # fmt: skip
+
+
+def test_the_band_ends_where_a_quantity_cannot_be(result: Result) -> None:
+    """A mass is not negative, whatever its standard deviation."""
+    doubtful = replace(result["m_p"], sigma=10.0 * result["m_p"].values)
+    figure = result_plot.figure(result.time, [doubtful, replace(doubtful, least=-math.inf)])
+    floors = [float(values(trace["y"]).min()) for trace in figure.traces if not trace["line"]["width"]][::2]
+    assert floors[0] == 0.0
+    assert floors[-1] < -10.0
 
 
 @pytest.mark.parametrize("kind", ["pdf", "svg", "png"])

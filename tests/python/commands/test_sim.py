@@ -103,7 +103,10 @@ def test_settings_prints_a_settings_file_for_the_firmware(lever: Run, tmp_path: 
         (("sim", "steady", "--bus-option", "settings"), "--bus-option settings: must be KEY=VALUE"),
         (("sim", "steady", "--bus-option", "speed=1"), "interface 'lever' has no option speed"),
         (("sim", "steady", "--interface", "socketcan", "--channel", "nocan7"), "cannot open socketcan channel nocan7"),
-        (("sim", "steady", *SHORT, "--out", __file__), f"cannot make the folder {__file__}: there is a file of that name"),
+        (
+            ("sim", "steady", *SHORT, "--out", __file__),
+            f"cannot make the folder {__file__}: there is a file of that name",
+        ),
         (("sim", "steady", *SHORT, "--out", "/dev/null/x"), "cannot make the folder /dev/null/x"),
     ],
 )

@@ -9,7 +9,7 @@ import numpy as np
 from ...firmware.library import enum_names
 from ...numeric.arrays import Array
 from ...results.trace import CORRECTION, TRUE_MARGIN
-from ..figure import Figure, Spec, axis, axis_range, band, hover, line, time_axis
+from ..figure import Figure, Spec, axis, axis_range, band, edges, hover, line, time_axis
 from ..run import Run
 from ..series import spread_indices
 
@@ -49,7 +49,7 @@ def margin(run: Run, limits: tuple[float, ...] = ()) -> Figure | None:
     if gain is None or sigma is None or state is None or frequency is None:
         return None
     chosen = spread_indices(len(run.time), _POINTS)
-    time, low, high = run.time[chosen], (gain - 2.0 * sigma)[chosen], (gain + 2.0 * sigma)[chosen]
+    time, (low, high) = run.time[chosen], edges(gain[chosen], sigma[chosen])
     settled = slice(len(chosen) // 10, None)
     shown = axis_range([low[settled], high[settled], np.array((0.0, *limits))], slice(None))
     true, correction = run.column(TRUE_MARGIN), run.column(CORRECTION[0])

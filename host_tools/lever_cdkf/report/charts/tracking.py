@@ -6,7 +6,7 @@ import numpy as np
 
 from ...firmware.quantities import DYNAMICS, Quantity, recorded_name
 from ...numeric.arrays import Array
-from ..figure import Figure, Spec, axis, axis_range, band, hover, line, time_axis
+from ..figure import Figure, Spec, axis, axis_range, band, edges, hover, line, time_axis
 from ..run import Run
 from ..series import spread_indices
 
@@ -38,10 +38,7 @@ def _tracked(run: Run, quantities: tuple[Quantity, ...], height: int) -> Figure 
 
 def _bounds(run: Run, quantity: Quantity) -> tuple[np.ndarray, np.ndarray] | None:
     estimate, sigma = run.estimate(quantity), run.sigma(quantity)
-    if estimate is None or sigma is None:
-        return None
-    lower = estimate - 2.0 * sigma
-    return lower if quantity.signed else np.maximum(lower, 0.0), estimate + 2.0 * sigma
+    return None if estimate is None or sigma is None else edges(estimate, sigma, quantity.least)
 
 
 def recorded(run: Run) -> Figure | None:
