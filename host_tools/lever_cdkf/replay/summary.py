@@ -14,6 +14,7 @@ from ..results.nis import Innovations, Nis, freedom
 from ..results.summary import Estimate, Mapped, RecordingSummary, ReplaySummary
 from ..results.trace import CONVERGED_AFTER, MEASURED, Trace
 from ..results.whiteness import Whiteness
+from ..text.counts import in_percent
 from . import proof
 from .reduction import Groups
 
@@ -147,7 +148,7 @@ def _time_estimated(summary: ReplaySummary) -> list[str]:
     total, estimating = sum(modes.values()), modes.get("run", 0.0) + modes.get("frozen", 0.0)
     if total and estimating < 0.5 * total:
         sentences.append(
-            f"Estimates exist for {100.0 * estimating / total:.0f} % of the time; elsewhere the first guess, or the "
+            f"Estimates exist for {in_percent(estimating / total):g} % of the time; elsewhere the first guess, or the "
             "last estimate, is shown."
         )
     return sentences

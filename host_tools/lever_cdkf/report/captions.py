@@ -1,6 +1,7 @@
 """The captions of the report: what its charts show, of which model, and against which truth."""
 
 from ..results import whiteness
+from ..text.counts import in_percent
 from .charts import stability, transfer
 from .run import Run
 
@@ -74,8 +75,8 @@ def feedthrough_caption(run: Run) -> str:
     if (accuracy := transfer.accuracy(run)) is not None:
         sentences.append(
             f"After the first third of the run the complex error was {100.0 * accuracy.error:.1f} % rms; ±2σ held the "
-            f"true magnitude {100.0 * accuracy.gain_covered:.0f} % and the true phase "
-            f"{100.0 * accuracy.phase_covered:.0f} % of the time."
+            f"true magnitude {in_percent(accuracy.gain_covered):g} % and the true phase "
+            f"{in_percent(accuracy.phase_covered):g} % of the time."
         )
     return " ".join(sentences)
 
@@ -92,7 +93,7 @@ def margin_caption(run: Run) -> str:
         sentences.append(
             f"After the first third of the run the estimated margin was {abs(accuracy.bias):.1f} dB too "
             f"{'high' if accuracy.bias > 0.0 else 'low'} (median; an estimate that is too high warns too late), and "
-            f"±2σ held the true one {100.0 * accuracy.covered:.0f} % of the time."
+            f"±2σ held the true one {in_percent(accuracy.covered):g} % of the time."
         )
     return " ".join(sentences)
 

@@ -12,6 +12,7 @@ from ..results import trust
 from ..results.faults import LITTLE
 from ..results.nis import Nis
 from ..results.summary import Quality
+from ..text.counts import in_percent
 from .run import Run
 
 NOTHING = "–"
@@ -37,7 +38,7 @@ def fixed(value: float | None, decimals: int) -> str:
 
 def percent(fraction: float | None) -> str:
     """Return a part of one as per cent."""
-    return NOTHING if fraction is None else f"{100.0 * fraction:.0f} %"
+    return NOTHING if fraction is None else f"{in_percent(fraction):g} %"
 
 
 def seconds(values: Sequence[float | None] | None) -> str:
@@ -172,25 +173,23 @@ def errors_table(run: Run) -> str:
     titles = (
         ("rms error", "%"),
         ("bias", "%"),
-        ("within ±2σ", "%"),
+        ("within ±2σ", ""),
         ("stays below 10 % after", "s"),
         ("below 5 %", "s"),
     )
-    header = ("", *(f"{name}<br>[{unit}]" for name, unit in titles))
-    rows = []
-    for quantity in run.quantities:
-        if figures := figures_of(run, quantity):
-            coverage = figures.coverage_2sigma
-            rows.append(
-                (
-                    f"{quantity.symbol} {quantity.name}",
-                    fixed(figures.rms_percent, 2),
-                    fixed(figures.bias_percent, 2),
-                    fixed(None if coverage is None else 100.0 * coverage, 1),
-                    _times(figures.time_to_10_percent_s),
-                    _times(figures.time_to_5_percent_s),
-                )
-            )
+    header = ("", *(f"{name}<br>{unit and f'[{unit}]'}" for name, unit in titles))
+    rows = [
+        (
+            f"{quantity.symbol} {quantity.name}",
+            fixed(figures.rms_percent, 2),
+            fixed(figures.bias_percent, 2),
+            percent(figures.coverage_2sigma),
+            _times(figures.time_to_10_percent_s),
+            _times(figures.time_to_5_percent_s),
+        )
+        for quantity in run.quantities
+        if (figures := figures_of(run, quantity))
+    ]
     return table(header, rows) if rows else ""
 
 
@@ -264,7 +263,7 @@ def run_table(run: Run) -> str:
     rows = [
         ("mean normalised innovation squared", number(nis.mean), "1"),
         ("the same if σ is right", number(nis.expected), "1"),
-        ("innovations inside their 95 % bound", number(None if inside is None else 100.0 * inside), "%"),
+        ("innovations inside their 95 % bound", percent(inside), ""),
         ("largest correlation of residuals", number(run.whiteness and run.whiteness.largest), "1"),
     ]
     rows += [(label, number(getattr(run.summary, key, None)), unit) for key, label, unit in RUN_FIGURES]
@@ -273,10 +272,7 @@ def run_table(run: Run) -> str:
     if run.summary:
         shares = {**run.summary.fault_shares, "any that warns": run.summary.flagged_share}
         time = "time" if run.summary.flagged_share is None else time
-    rows += [
-        (f"of the {time} with fault: {html.escape(name)}", number(None if share is None else 100.0 * share), "%")
-        for name, share in shares.items()
-    ]
+    rows += [(f"of the {time} with fault: {html.escape(name)}", percent(share), "") for name, share in shares.items()]
     return table(("", "value", "unit"), [row for row in rows if row[1] != NOTHING])
 
 

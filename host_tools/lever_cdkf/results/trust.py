@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from ..firmware.estimator import DO_NOT_TRUST, fault_names
 from ..firmware.library import enum_words
+from ..text.counts import in_percent
 from .faults import LITTLE
 
 MOST = 0.5
@@ -36,8 +37,10 @@ def warning(shares: Mapping[str, float], warned: float | None) -> str:
     causes = _causes(shares)
     if not causes or warned is None or warned <= LITTLE:
         return ""
-    listed = "; ".join(f"{enum_words('lever_fault')[name]} ({_percent(shares[name])} of the time)" for name in causes)
-    part = "" if warned >= MOST else f" {_percent(warned)} of the time"
+    listed = "; ".join(
+        f"{enum_words('lever_fault')[name]} ({in_percent(shares[name]):g} % of the time)" for name in causes
+    )
+    part = "" if warned >= MOST else f" {in_percent(warned):g} % of the time"
     return f"Do not trust the estimates{part}: {listed}."
 
 
@@ -51,10 +54,6 @@ def next_step(shares: Mapping[str, float], tune_command: str = "") -> str:
 
 def _causes(shares: Mapping[str, float]) -> list[str]:
     return [name for name in _STEPS if shares.get(name, 0.0) > LITTLE]
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f} %"
 
 
 assert set(_STEPS) == set(fault_names(DO_NOT_TRUST))

@@ -324,7 +324,7 @@ def _tables(result: SimulationResult) -> Tables:
         "expected NIS [1]": summary.nis.expected,
         "largest correlation [1]": summary.whiteness.largest if summary.whiteness else None,
         "simulated time [s]": summary.simulated_time_s,
-        "wall time [s]": summary.wall_time_s,
+        "computing time [s]": summary.wall_time_s,
         "firmware": summary.firmware.version,
     }
     tables: Tables = {summary.scenario.title: rows, "run": [run_row]}

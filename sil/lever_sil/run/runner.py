@@ -114,11 +114,11 @@ def simulate(
     _check_bounded(recording)
     frames = recording.frames()
     columns = columns_of(recording, frames)
-    untimed = summary.build(recording, columns)
+    result = SimulationResult(columns, summary.build(recording, columns).timed(clock.perf_counter() - start), frames)
     if out_dir is not None:
         files = _Files(out_dir, channel, formats, inputs, story)
-        files.write(SimulationResult(columns, untimed, frames), published(recording, frames), start)
-    return SimulationResult(columns, untimed.timed(clock.perf_counter() - start), frames)
+        files.write(result, published(recording, frames))
+    return result
 
 
 def _check_bounded(recording: Recording) -> None:
@@ -144,12 +144,9 @@ class _Files:
     inputs: Sequence[str | Path]
     story: Callable[[], Story] | None
 
-    def write(self, result: SimulationResult, published: NDArray[np.bool_], start: float) -> None:
-        """Write the files; summary.json comes last, so that its wall time is of everything."""
+    def write(self, result: SimulationResult, published: NDArray[np.bool_]) -> None:
+        """Write the files."""
         from lever_cdkf.report import write_report
-
-        def elapsed() -> SimulationSummary:
-            return result.summary.timed(clock.perf_counter() - start)
 
         origin = provenance(self.inputs)
         with Outputs(self.folder, self.inputs, ("report.html", *FORMATS.values())) as outputs:
@@ -161,9 +158,9 @@ class _Files:
                 signals.add(result.trace, published, np.zeros_like(published))
                 signals.close()
             origin = origin.with_outputs(outputs.written("bus.log", FORMATS["csv"]))
-            summary = replace(elapsed(), provenance=origin)
+            summary = replace(result.summary, provenance=origin)
             if not missing("report"):
                 story = None if self.story is None else self.story()
                 write_report(result.trace, summary, outputs.path("report.html"), story)
-            write_text(outputs.path("summary.json"), text(replace(elapsed(), provenance=origin)))
+            write_text(outputs.path("summary.json"), text(summary))
             outputs.finish()

@@ -28,6 +28,7 @@ from lever_cdkf.results.summary import (
 )
 from lever_cdkf.results.trace import Trace
 from lever_cdkf.results.whiteness import Whiteness
+from lever_cdkf.text.counts import in_percent
 
 from .. import measures
 from ..scenarios.scenario import Scenario
@@ -215,7 +216,7 @@ def missed_limits(
     least = limits.get("coverage")
     for name, share in coverage.items():
         if least is not None and share is not None and share < least:
-            missed.append(f"coverage of {name} {_whole_percent(share)} % (limit {100.0 * least:g} %)")
+            missed.append(f"coverage of {name} {in_percent(share):g} % (limit {100.0 * least:g} %)")
     return missed
 
 
@@ -223,11 +224,6 @@ def _above(value: float, limit: float) -> str:
     """With as many decimals as it takes to differ from the limit."""
     texts = (f"{value:.{decimals}f}" for decimals in range(1, 12))
     return next((text for text in texts if float(text) > limit), f"{value!r}")
-
-
-def _whole_percent(share: float) -> int:
-    """Not rounded up, so that what is below a limit does not look as if it kept it."""
-    return math.floor(100.0 * share + 1e-9)
 
 
 def _verdict(summary: SimulationSummary) -> str:
@@ -308,7 +304,7 @@ def _verdict_sigma(quality: dict[str, Quality]) -> str:
     if not covered:
         return ""
     worst = min(covered, key=lambda name: covered[name])
-    percent = f"{_whole_percent(covered[worst])} % of the time"
+    percent = f"{in_percent(covered[worst]):g} % of the time"
     if covered[worst] >= LEAST_COVERAGE:
         return f"In this run ±2σ covers every truth for at least {percent}."
     return f"In this run the stated σ of {_spelled(worst)} is too small: ±2σ covers the truth for {percent}."

@@ -67,7 +67,7 @@ def test_rows_are_median_worst_and_coverage() -> None:
         (RUNS, []),  # the median keeps what the worst run misses
         ([RUNS[1]] * 2 + RUNS, ["rms error of m_p 9.0 % (limit 5 %)", "coverage of m_p 50 % (limit 60 %)"]),
         ([summary(1, None, None, [None])], []),  # too short to judge
-        ([summary(1, None, None, [None])] * 2 + RUNS[:1], ["rms error of m_p inf %", "coverage of m_p 33 %"]),
+        ([summary(1, None, None, [None])] * 2 + RUNS[:1], ["rms error of m_p inf %", "coverage of m_p 33.3 %"]),
     ],
 )
 def test_limits_are_for_the_median_error_and_all_coverage(runs: list[Any], expected: list[str]) -> None:

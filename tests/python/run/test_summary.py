@@ -94,7 +94,7 @@ def test_errors_are_relative_and_judged_after_convergence_only(recording: loop.R
     ("outside", "said"),
     [
         (600, "In this run ±2σ covers every truth for at least 90 % of the time."),
-        (601, "In this run the stated σ of m_p is too small: ±2σ covers the truth for 89 % of the time."),
+        (601, "In this run the stated σ of m_p is too small: ±2σ covers the truth for 89.9 % of the time."),
     ],
 )
 def test_sigma_is_too_small_where_it_covers_less_than_90_percent(
@@ -107,7 +107,7 @@ def test_sigma_is_too_small_where_it_covers_less_than_90_percent(
     summed = summary.build(recording, trace)
     assert summed.parameters["m_p"].coverage_2sigma == pytest.approx(1.0 - outside / 6000)
     assert said in summed.verdict
-    assert summed.missed == ([] if outside == 600 else ["coverage of m_p 89 % (limit 90 %)"])
+    assert summed.missed == ([] if outside == 600 else ["coverage of m_p 89.9 % (limit 90 %)"])
 
 
 @pytest.mark.parametrize(("factor", "kept"), [(1.0499, True), (1.0501, False)])
