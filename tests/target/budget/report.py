@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ def run(args: argparse.Namespace) -> int:
     with Progress("budget") as progress:
         runs = measure.run_all(elf, progress.show)
         budget = measure.budget(elf, args.firmware, runs, progress.show)
-    print_tables(tables(budget))
+    show(budget)
     if args.json is not None:
         write_text(args.json, json.dumps(budget, indent=2) + "\n")
     if args.accept:
@@ -53,6 +54,13 @@ def _judge(budget: dict[str, Any]) -> int:
     for line in complaints:
         print(f"budget: {line}", file=sys.stderr)
     return 1 if complaints else 0
+
+
+def show(budget: dict[str, Any]) -> None:
+    """Print the budget; where there is no terminal, chains of calls are folded at the width of a page."""
+    if not sys.stdout.isatty():
+        os.environ.setdefault("COLUMNS", "120")
+    print_tables(tables(budget))
 
 
 def tables(budget: dict[str, Any]) -> Tables:

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import copy
+import os
 from collections.abc import Callable
 from typing import Any
 
 import pytest
-from target.budget import golden
+from target.budget import golden, report
 
 pytestmark = pytest.mark.requires("arm-none-eabi-gcc", "qemu-system-arm")
+
+
+def test_its_tables_fit_on_a_page(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "environ", {name: value for name, value in os.environ.items() if name != "COLUMNS"})
+    row = {"function": "lever_update", "stack [bytes]": 1000, "deepest chain": " > ".join(["filter/cdkf.c:move"] * 20)}
+    monkeypatch.setattr(report, "tables", lambda _: {"Stack by function": [row, row]})
+    report.show({})
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 120
+    assert sum(line.count("filter/cdkf.c:move") for line in lines) == 40
 
 
 @pytest.mark.requirement("R48")
