@@ -20,7 +20,7 @@ def test_the_notebook_runs(root: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "natural_frequency = " in done.stdout
     assert "looks like degrees" in done.stdout
-    assert (tmp_path / "estimates.parquet").is_file()
+    assert list(tmp_path.iterdir()) == [program], "it leaves no file behind"
 
 
 def shown(cell: str) -> str:
