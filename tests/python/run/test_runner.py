@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from collections.abc import Callable
@@ -14,10 +15,12 @@ import pytest
 from lever_cdkf.can import codec
 from lever_cdkf.can.bus import LeverBus
 from lever_cdkf.errors import LeverError, SettingsError
+from lever_cdkf.report.summary_html import number
 from lever_sil.run import loop, runner
 from lever_sil.scenarios import inputs, scenario
 from lever_sil.scenarios.scenario import Scenario
 from python.conftest import PuppetBus, estimate
+from python.report.reading import read
 
 MakeBus = Callable[[Scenario], LeverBus]
 
@@ -257,6 +260,13 @@ def test_progress_is_told_from_start_to_end_each_half_second() -> None:
     wanted = scenario.load("steady", ["duration=1.2 s"])
     loop.run(wanted, PuppetBus(always), progress=lambda done, total: calls.append((done, total)))
     assert calls == [(done, 1200) for done in (0, 500, 1000, 1200)]
+
+
+def test_the_computing_time_is_the_same_wherever_it_is_said(short: Scenario, tmp_path: Path) -> None:
+    result = runner.simulate(short, PuppetBus(always), tmp_path)
+    assert json.loads((tmp_path / "summary.json").read_text())["wall_time_s"] == result.summary.wall_time_s
+    rows = [row for table in read(tmp_path / "report.html").tables for row in table]
+    assert ["computing time", number(result.summary.wall_time_s), "s"] in rows
 
 
 def test_files_are_complete_or_not_there(short: Scenario, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
