@@ -16,7 +16,7 @@ import screenshot
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.native import enum_words
 from lever_cdkf.report import captions, summary_html, write_report
-from lever_cdkf.report.charts import tracking
+from lever_cdkf.report.charts import stability, tracking
 from lever_cdkf.report.run import COHERENT, Run
 from lever_sil.run.runner import SimulationResult
 
@@ -213,6 +213,16 @@ def test_the_margin_s_caption_says_how_far_it_was_from_the_truth(result: Simulat
     without = Run({**result.trace, **known}, result.summary)
     assert "truth" not in captions.margin_caption(without)
     assert "held" not in captions.margin_caption(without)
+
+
+def test_the_margin_is_drawn_with_two_standard_deviations(result: SimulationResult) -> None:
+    ones = np.ones(len(result.trace["time_s"]))
+    known = {"gain_margin_dB": 3.0 * ones, "gain_margin_sigma_dB": 1.5 * ones}
+    run = Run({**result.trace, **known, "bounce": 0.0 * ones, "bounce_frequency_Hz": 4.0 * ones}, result.summary)
+    figure = stability.margin(run)
+    assert figure is not None
+    drawn = [unpack(trace["y"]) for trace in figure.traces[:3]]
+    assert [(edge.min(), edge.max()) for edge in drawn] == [(0.0, 0.0), (6.0, 6.0), (3.0, 3.0)]
 
 
 def test_the_headline_begins_with_the_warning(result: SimulationResult) -> None:

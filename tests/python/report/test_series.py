@@ -7,7 +7,7 @@ import pytest
 from lever_cdkf.numeric.stretches import runs
 from lever_cdkf.report import series
 from lever_cdkf.report.bode import FREQUENCIES, slow_trim, transfer
-from lever_cdkf.report.figure import Figure, axis, band, time_axis
+from lever_cdkf.report.figure import Figure, axis, band, edges, time_axis
 from lever_cdkf.report.printed import charts, values
 from oracle import Lever
 from scipy import signal
@@ -102,6 +102,15 @@ def test_jumps_are_found_once_and_drift_is_none() -> None:
 def test_runs_are_first_and_last_index() -> None:
     assert runs(np.array([True, True, False, True])) == [(0, 1), (3, 3)]
     assert runs(np.zeros(3, dtype=bool)) == []
+
+
+def test_the_edges_of_a_band_are_within_what_can_be() -> None:
+    value, sigma = np.array([1.0, 3.0, np.nan]), np.array([1.0, 1.0, 1.0])
+    for limits, low, high in (({}, [-1.0, 1.0], [3.0, 5.0]), ({"least": 0.0, "most": 4.0}, [0.0, 1.0], [3.0, 4.0])):
+        found = edges(value, sigma, **limits)
+        assert [edge[:2].tolist() for edge in found] == [low, high]
+        assert np.isnan([edge[2] for edge in found]).all()
+    assert [edge[1] for edge in edges(value, sigma, sigmas=3.0)] == [0.0, 6.0]
 
 
 def test_a_band_ends_where_an_edge_is_unknown() -> None:
