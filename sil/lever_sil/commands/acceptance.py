@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from lever_cdkf.cli.layout import say
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
-from lever_cdkf.runtime.files import check_writable, json_text, make_folder, write_texts
+from lever_cdkf.runtime.files import check_writable, make_folder
 
 from .names import check_names
+from .results import write_results
 
 if TYPE_CHECKING:
     from ..acceptance.result import AcceptanceCondition, ConditionResult, Figure, Limit
@@ -111,26 +112,9 @@ class AcceptanceCommand(ABC, Generic[Row]):
         judged = sum(bool(result.condition.limits) for result in results)
         held = f"{judged - len(missed)} of {judged} conditions hold." if judged else "None of these has limits."
         say(held + (f" Missed: {', '.join(missed)}." if missed else ""))
-        self._write(args, results, seeds)
+        page = None if args.out is None else args.out / f"{self.name}.html"
+        write_results(page, lambda: self.page(results, seeds), args.json, {"rows": table.rows(results)})
         return 1 if missed else 0
-
-    def _write(self, args: argparse.Namespace, results: Sequence[ConditionResult], seeds: int) -> None:
-        """Write the files that were asked for."""
-        from dataclasses import asdict
-
-        from lever_cdkf.runtime.provenance import provenance, with_provenance
-
-        from ..acceptance import table
-
-        origin, files = provenance(), {}
-        if args.out is not None:
-            files[args.out / f"{self.name}.html"] = with_provenance(self.page(results, seeds), origin)
-        if args.json is not None:
-            content = {"rows": table.rows(results), "provenance": asdict(origin)}
-            files[Path(args.json)] = json_text(content)
-        write_texts(files)
-        if args.out is not None:
-            say(f"Written to {args.out}: {self.name}.html")
 
     def _chosen(self, args: argparse.Namespace) -> list[Row]:
         """Return the conditions that were asked for. Raise LeverError for one that is not known."""

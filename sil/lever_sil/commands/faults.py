@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +10,13 @@ from lever_cdkf.cli.layout import say
 from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
-from lever_cdkf.runtime.files import json_text, make_folder, write_texts
+from lever_cdkf.runtime.files import make_folder
 from lever_cdkf.text.counts import counted
 
 from .names import check_names
+from .results import write_results
 
 if TYPE_CHECKING:
-    from ..faults.matrix import RowResult
     from ..faults.rows import Row
 
 _DESCRIPTION = """\
@@ -69,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     """`lever faults`."""
     from lever_cdkf.cli.tables import print_tables
 
-    from ..faults import matrix, table
+    from ..faults import faults_page, matrix, table
     from ..faults.rows import ROWS
 
     if args.list:
@@ -94,27 +93,10 @@ def run(args: argparse.Namespace) -> int:
     say(f"{said}; {known} of these are known limitations.")
     if unexpected := table.unexpected(results):
         say(f"Not known before: {', '.join(unexpected)}.")
-    _write(args, results, seeds)
+    page = None if args.out is None else args.out / "faults.html"
+    rows = {"rows": table.rows(results), **counts}
+    write_results(page, lambda: faults_page.build(results, seeds), args.json, rows)
     return 1 if unexpected else 0
-
-
-def _write(args: argparse.Namespace, results: Sequence[RowResult], seeds: int) -> None:
-    """Write the files that were asked for."""
-    from dataclasses import asdict
-
-    from lever_cdkf.runtime.provenance import provenance, with_provenance
-
-    from ..faults import faults_page, table
-
-    origin, files = provenance(), {}
-    if args.out is not None:
-        files[args.out / "faults.html"] = with_provenance(faults_page.build(results, seeds), origin)
-    if args.json is not None:
-        content = {"rows": table.rows(results), **table.counts(results), "provenance": asdict(origin)}
-        files[Path(args.json)] = json_text(content)
-    write_texts(files)
-    if args.out is not None:
-        say(f"Written to {args.out}: faults.html")
 
 
 def _chosen(args: argparse.Namespace) -> list[Row]:

@@ -12,10 +12,11 @@ from lever_cdkf.cli.layout import say
 from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
-from lever_cdkf.runtime.files import check_writable, json_text, write_texts
+from lever_cdkf.runtime.files import check_writable
 from lever_cdkf.text.counts import counted
 
 from .names import seed
+from .results import write_results
 
 if TYPE_CHECKING:
     from ..soak.soak import SoakResult
@@ -50,17 +51,14 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
         "--hours", type=float, default=24.0, metavar="H", help="rounded to whole flights of 5 minutes (default: 24)"
     )
     parser.add_argument("--seed", type=seed, default=1, help="of all random numbers (default: 1)")
-    parser.add_argument("-o", "--out", metavar="FILE", help="also write a page with charts over the hours")
+    parser.add_argument("-o", "--out", metavar="FILE", type=Path, help="also write a page with charts over the hours")
     parser.add_argument("--json", metavar="FILE", help='also write the hours to FILE: {"hours": [{"hour", …}], …}')
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
     """`lever soak`."""
-    from dataclasses import asdict
-
     from lever_cdkf.cli.tables import print_tables
-    from lever_cdkf.runtime.provenance import provenance, with_provenance
 
     from ..soak import soak, soak_page
 
@@ -76,16 +74,9 @@ def run(args: argparse.Namespace) -> int:
     print_tables({"hours": [*hours, total]})
     say(verdict := _verdict(result))
     troubles = result.troubles()
-    origin, files = provenance(), {}
-    if args.json is not None:
-        faults = dict(sorted(result.faults.items()))
-        content = {"hours": hours, "total": total, "memory_growth_mib": result.growth, "faults": faults}
-        files[Path(args.json)] = json_text(content | {"troubles": troubles, "provenance": asdict(origin)})
-    if args.out is not None:
-        files[Path(args.out)] = with_provenance(soak_page.build(result, [*hours, total], verdict), origin)
-    write_texts(files)
-    if args.out is not None:
-        say(f"Written to {args.out}")
+    sums = {"hours": hours, "total": total, "memory_growth_mib": result.growth}
+    sums |= {"faults": dict(sorted(result.faults.items())), "troubles": troubles}
+    write_results(args.out, lambda: soak_page.build(result, [*hours, total], verdict), args.json, sums)
     if troubles:
         print(f"lever: soak: {'; '.join(troubles)}", file=sys.stderr)
     return 1 if troubles else 0
