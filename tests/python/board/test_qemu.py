@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -21,3 +22,17 @@ def test_a_qemu_that_ends_at_once_is_told_with_what_it_says(
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     assert refused("qemu", image) == f"lever: error: {qemu.PROGRAM} has ended: {shown}\n"
+
+
+def test_one_processor_is_one_of_those_that_the_thread_may_use() -> None:
+    """And afterwards it may use the same as before."""
+    everything = os.sched_getaffinity(0)
+    try:
+        for allowed in (everything, {max(everything)}):
+            os.sched_setaffinity(0, allowed)
+            with qemu.one_processor():
+                inside = os.sched_getaffinity(0)
+            assert len(inside) == 1
+            assert inside <= allowed == os.sched_getaffinity(0)
+    finally:
+        os.sched_setaffinity(0, everything)

@@ -30,6 +30,13 @@ def test_the_senders_clock_counts_and_not_the_recorders_jitter(pieces: int) -> N
     assert (clocks.samples, clocks.late, clocks.restarts, clocks.recorder_jumps, clocks.gaps) == (1000, 0, 0, 0, 0)
 
 
+def test_the_typical_step_is_that_of_most_samples() -> None:
+    """Whatever the settings say of the sample period, and in spite of samples that are missing."""
+    recorded, sender = steady(1000)
+    there = np.arange(1000) % 10 > 2
+    assert seconds(2 * recorded[there], 2 * sender[there])[1].typical_step_us == 2000
+
+
 def test_32_bits_that_wrap_go_on() -> None:
     time, timeline = seconds(*steady(2000, WRAP - 1_000_000), 3)
     np.testing.assert_array_equal(time, np.arange(2000) / 1000)

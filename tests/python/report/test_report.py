@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 import screenshot
 from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.estimator import TEST_RATIOS
 from lever_cdkf.firmware.native import enum_words
 from lever_cdkf.report import captions, summary_html, write_report
-from lever_cdkf.report.charts import stability, tracking
+from lever_cdkf.report.charts import health, stability, tracking
 from lever_cdkf.report.run import COHERENT, Run
 from lever_sil.run.runner import SimulationResult
 
@@ -223,6 +224,17 @@ def test_the_margin_is_drawn_with_two_standard_deviations(result: SimulationResu
     assert figure is not None
     drawn = [unpack(trace["y"]) for trace in figure.traces[:3]]
     assert [(edge.min(), edge.max()) for edge in drawn] == [(0.0, 0.0), (6.0, 6.0), (3.0, 3.0)]
+
+
+def test_each_test_ratio_has_a_look_of_its_own(result: SimulationResult) -> None:
+    """Which plotly.js knows: of others it draws a plain line, and says nothing."""
+    count = len(result.trace["time_s"])
+    columns = {"evidence": np.arange(float(count)) % len(TEST_RATIOS), "test_ratio": np.full(count, 0.5)}
+    figure = health.test_ratios(Run({**result.trace, **columns}, result.summary))
+    assert figure is not None
+    looks = [(trace["line"]["color"], trace["line"]["dash"]) for trace in figure.traces[: len(TEST_RATIOS)]]
+    assert len(set(looks)) == len(TEST_RATIOS)
+    assert {dash for _, dash in looks} <= {"solid", "dot", "dash", "longdash", "dashdot", "longdashdot"}
 
 
 def test_the_headline_begins_with_the_warning(result: SimulationResult) -> None:
