@@ -7,6 +7,7 @@ import hashlib
 import json
 import math
 import re
+import shlex
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -18,6 +19,7 @@ import pytest
 from lever_cdkf.can import codec
 from lever_cdkf.cli.formats import FORMATS
 from lever_cdkf.cli.main import main
+from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.estimator import TEST_RATIOS
 from lever_cdkf.replay import engine, reduction
 from lever_cdkf.replay.outputs import FILES
@@ -169,6 +171,20 @@ def test_a_log_that_is_cut_off_is_used_with_a_warning(
     status, _, err = lever(*command, tmp_path / "cut.log")
     assert status == 0
     assert re.fullmatch(r"lever: warning: [Tt]he log is incomplete: .*cut.log: its last line has no end\.?\n", err)
+
+
+def test_the_command_that_is_proposed_tunes_the_same_part(
+    session: Session, refused: Refused, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    proposed: list[str] = []
+
+    def keep(_logs: object, asked: engine.Options, *_: object) -> None:
+        proposed.append(asked.tune_command)
+        raise LeverError("stop")
+
+    monkeypatch.setattr(engine, "replay", keep)
+    refused("replay", session.log, "--start", "1", "--length", "3")
+    assert "too short to tune on: 3 s of samples" in refused(*shlex.split(proposed[0])[1:])
 
 
 def test_gaps_and_restarts_are_told(session: Session, tmp_path: Path) -> None:
