@@ -89,7 +89,7 @@ def _key(name: str) -> str:
     """Return theta of theta, theta_deg and "theta [deg]"."""
     label, unit = split_name(name)
     if label == name and unit:
-        for key in sorted(KINDS, key=len, reverse=True):
+        for key in KINDS:
             if name.startswith(f"{key}_") and normal(name[len(key) :].replace("_", "/").strip("/")) == normal(unit):
                 return key
     return label
