@@ -24,7 +24,7 @@ from lever_cdkf.text.units import GRAVITY
 from .. import measures
 from ..plants.excitation import Noise, Rotor
 from .draws import streams
-from .steps import LONGEST_SUBSTEP, follow
+from .steps import follow, substeps_of
 
 SEEDS, DURATION = 20, 60.0
 """Runs, and their length [s]."""
@@ -89,7 +89,7 @@ def runs(base: str, count: int, duration: float) -> tuple[Array, Array, Array]:
     z_ddot = np.stack([BASES[base].samples(time, own["base"]) for own in drawn])
     guess = np.array([settings[name] for name in ("m_p", "c_p", "k_p")])
     p = np.stack([guess * own["pilot"].uniform(0.75, 1.25, 3) for own in drawn])
-    substeps = math.ceil(period / LONGEST_SUBSTEP - 1e-6)
+    substeps = substeps_of(period)
     shape = (len(time) - 1, substeps)
     kicks = (
         _PROCESS_NOISE

@@ -62,7 +62,7 @@ def stepped(step: Step, runs: int, seed: int) -> Batch:
     first = np.stack([guess * own["pilot"].uniform(1 - step.spread, 1 + step.spread, PARAMETERS) for own in drawn_from])
     factor = np.where(time[:, None] < step.at, 1.0, (1.0, step.factor, step.factor))
     p = first[:, None] * factor
-    substeps = math.ceil(period / LONGEST_SUBSTEP - 1e-6)
+    substeps = substeps_of(period)
     kick = step.process_noise * math.sqrt(period / substeps)
     kicks = np.stack([kick * own["process"].standard_normal((len(time) - 1, substeps)) for own in drawn_from])
     x = follow(lever, p, u, step.trim, kicks, period)
@@ -71,6 +71,11 @@ def stepped(step: Step, runs: int, seed: int) -> Batch:
     dynamics = np.moveaxis(lever.dynamics(np.moveaxis(p, -1, 0), step.trim), 0, -1)
     truth = Truth(x, p if step.model == "lever" else None, dynamics)
     return measured(settings, step.model, "trim", (y, u), truth)
+
+
+def substeps_of(period: float) -> int:
+    """Return the fewest in a period [s] of which none is longer than LONGEST_SUBSTEP."""
+    return math.ceil(period / LONGEST_SUBSTEP - 1e-6)
 
 
 def follow(lever: Lever, p: Array, u: Array, trim: float, kicks: Array, period: float) -> Array:

@@ -13,7 +13,7 @@ from lever_cdkf.models.lever import Lever
 from lever_sil.plants import lever_plant
 from lever_sil.plants.truth import Conditions
 from lever_sil.study.data import Batch
-from lever_sil.study.steps import Step, follow, stepped
+from lever_sil.study.steps import Step, follow, stepped, substeps_of
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
@@ -54,6 +54,12 @@ def test_truth_moves_as_the_plant_does(batch: Batch) -> None:
     dynamics = lever_plant.dynamics(lever_plant.Lever.from_settings(DEFAULTS), truth, "trim")
     np.testing.assert_allclose(batch.truth.dynamics[run, :, 0], dynamics.natural_frequency, rtol=1e-12)
     np.testing.assert_allclose(batch.truth.dynamics[run, :, 1], dynamics.damping_ratio, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("period", "count"), [(3e-4, 1), (5e-4, 1), (6e-4, 2), (1e-3, 2), (1.1e-3, 3), (2e-3, 4)])
+def test_substeps_are_as_few_as_may_be(period: float, count: int) -> None:
+    assert substeps_of(period) == count
+    assert substeps_of(period * (1.0 + 1e-9)) == count, "but for rounding"
 
 
 def test_process_noise_is_that_of_the_step() -> None:
