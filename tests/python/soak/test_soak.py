@@ -40,6 +40,8 @@ def test_ten_minutes(summary: Content) -> None:
     assert total["NIS (expected 1)"] == pytest.approx(1.0, abs=0.05)
     assert total["natural_frequency within 2 sigma [%]"] > 80.0
     assert total["recoveries"] == 0
+    (hour,) = summary["hours"]
+    assert hour | {"hour": "all"} == total, "a part of an hour is all there is"
 
 
 def test_flights_differ_and_repeat() -> None:
