@@ -108,6 +108,16 @@ def test_other_commands_come_beside_the_usual_ones_or_instead(usual: bool, expec
     assert at == sorted([0, 200, 300, 400, 500, 750, *expected])
 
 
+def test_a_flood_of_commands_comes_instead_of_the_usual_ones_in_sequence() -> None:
+    """So that what the estimator refuses is refused for what it holds, and not for a counter that came twice."""
+    sent = bus.Bus(1000, 1e-3, False, 0.3, np.random.default_rng(1))
+    bus.flood([{}], {}, 2)(sent, (0.4, 0.6))
+    frames = sent.delivered()
+    commands = frames[frames["id"] == 0x120]
+    assert commands["at"].tolist() == sorted([0, 250, *range(400, 600), *range(400, 600), 750])
+    assert [int(data[1]) & 15 for data in commands["change"]] == [i & 15 for i in range(403)]
+
+
 def test_readings_are_spoilt_as_the_fault_says() -> None:
     def spoilt(fault: readings.Fault) -> readings.Readings:
         right = readings.Readings.right(6, 1e-3, np.random.default_rng(1))
