@@ -116,6 +116,14 @@ def test_the_firmware_dithers_the_lever_while_samples_are_lost(whole: bool) -> N
     assert track.feedthrough is None, "it is not noted in the loop"
 
 
+def test_a_condition_has_the_dither_and_the_losses_that_it_says() -> None:
+    motion = Motion(duration=3.0, torque=())
+    loops = {"usual": ClosedLoop(), "none lost": ClosedLoop(lost=0.0), "no dither": ClosedLoop(dither=0.0)}
+    rows = [Condition(name, "", motion, start=1.0, closed_loop=loop) for name, loop in loops.items()]
+    found = [result.values["f_n rms"] for result in run_conditions.run(rows, {}, 1, lambda *_: None)]
+    assert len(np.unique(found)) == len(rows)
+
+
 @pytest.mark.usefixtures("short")
 def test_what_misses_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["envelope", "--seeds", "2", "--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]) == 1
