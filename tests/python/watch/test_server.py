@@ -21,6 +21,7 @@ from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.library import enum_names
 from lever_cdkf.numeric.arrays import ComplexArray, FloatArray
+from lever_cdkf.watch.picture import STEP
 from lever_cdkf.watch.server import Server
 from lever_cdkf.watch.sources import Source
 from lever_cdkf.watch.state import WITHOUT_TORQUE, State, command_of
@@ -502,6 +503,27 @@ def test_read_only_sends_nothing(on_server: Callable[..., FlightSource]) -> None
             assert await visitor.hear("refused") == "this page is read-only: no commands"
 
     assert on_server(story, read_only=True).commanded == []
+
+
+# --- its end ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_server_that_has_ended_asks_its_source_for_nothing_more(flight: Flight) -> None:
+    source = FlightSource(flight)
+    server = Server(source, Config(), host="127.0.0.1", port=0, read_only=False)
+
+    async def story() -> None:
+        stop = asyncio.Event()
+        task = asyncio.create_task(server.run(stop))
+        while flight.sample == 0:
+            await asyncio.sleep(STEP)
+        stop.set()
+        await task
+        asked = flight.sample
+        await asyncio.sleep(3.0 * STEP)
+        assert flight.sample == asked
+
+    asyncio.run(asyncio.wait_for(story(), PATIENCE))
 
 
 # --- as a command ----------------------------------------------------------------------------------------------------
