@@ -24,6 +24,7 @@ from lever_cdkf.firmware.estimator import TEST_RATIOS
 from lever_cdkf.replay import engine, reduction
 from lever_cdkf.replay.outputs import FILES
 from lever_cdkf.replay.summary import verdict
+from lever_cdkf.report import summary_html
 from lever_cdkf.results.summary import ReplaySummary, of
 from python.conftest import Refused, Run, Session, simulated
 from python.report.reading import figures, first_number, read, unpack
@@ -333,6 +334,9 @@ def test_it_says_when_the_recording_began(session: Session, tmp_path: Path) -> N
         )
     )
     assert replayed(tmp_path / "out", tmp_path / "may.log")["recording"]["start"] == "2023-11-14 22:13:20 UTC"
+    page = read(tmp_path / "out/report.html")
+    assert "A log, replayed: bus lever from 2023-11-14 22:13:20 UTC on." in "".join(page.text)
+    assert ["frames in the log", summary_html.number(2000), ""] in [row for table in page.tables for row in table]
 
 
 def test_settings_that_the_firmware_refuses_are_one_line(session: Session, refused: Refused, tmp_path: Path) -> None:
