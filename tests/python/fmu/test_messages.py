@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from fmpy.fmi1 import FMICallException
@@ -90,6 +91,18 @@ def test_a_step_that_is_no_multiple(step: float, controller: Path) -> None:
     )
     instance.step(0.001, 0.003)
     assert instance.get("time") == {"time": 0.004}
+
+
+def test_every_message_is_of_a_category_that_the_description_names(controller: Path) -> None:
+    """An importer turns categories on by these names."""
+    instance = Instance(controller, events=True)
+    instance.step(0.0)  # without inputs
+    assert status_of(lambda: instance.step(0.5)) == DISCARD
+    assert status_of(lambda: instance.set({"k_p": 1000.0})) == ERROR
+    root = ElementTree.parse(controller / "modelDescription.xml")
+    assert {category for _, category, _ in instance.messages} == {
+        category.get("name") for category in root.iter("Category")
+    }
 
 
 def test_a_step_from_another_time(controller: Path) -> None:
