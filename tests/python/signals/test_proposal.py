@@ -180,6 +180,15 @@ def test_a_database_in_utf_8_or_not(tmp_path: Path) -> None:
         assert message.signals[0].unit == "°"
 
 
+def test_a_database_with_a_flaw_in_a_message_is_read(tmp_path: Path) -> None:
+    """Others' are as they are: here one signal is longer than its frame, and two overlap."""
+    places = {"One": "8|16", "Two": "0|16"}
+    signals = "".join(f' SG_ {name} : {bits}@1- (1,0) [0|0] "" A\n' for name, bits in places.items())
+    (tmp_path / "it.dbc").write_text(f"BU_: A\nBO_ 5 Lever: 2 A\n{signals}")
+    (message,) = load_database(tmp_path / "it.dbc").messages
+    assert {each.name for each in message.signals} == places.keys()
+
+
 def test_what_cannot_be_proposed(folder: Path, tmp_path: Path, refused: Refused) -> None:
     log = folder / "flight.blf"
     assert "add --dbc FILE" in refused("map", log)
