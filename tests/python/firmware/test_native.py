@@ -55,6 +55,11 @@ def feed(estimator: Estimator, samples: dict[str, Any], index: int) -> str:
 # --- the façade as cffi reads it -------------------------------------------------------------------------------------
 
 
+def test_all_that_it_says_to_offer_is_there() -> None:
+    """Else `from lever_cdkf.firmware.native import *` is an error."""
+    assert set(native.__all__) - set(dir(native)) == set()
+
+
 def test_settings_table_is_the_definition(root: Path) -> None:
     text = (root / "firmware/lever_settings.def").read_text(encoding="utf-8")
     pattern = r'^LEVER_SETTING\((\w+), "(.*?)", (\S+)f, (\S+)f, (\S+)f, "(.*)"\)$'
