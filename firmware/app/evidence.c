@@ -230,6 +230,12 @@ static void trust_base(evidence_t *evidence)
     evidence_set(evidence, EVIDENCE_BASE, 0.0f);
 }
 
+void evidence_start_calibration(evidence_t *evidence)
+{
+    calibration_start(&evidence->calibration);
+    evidence_set(evidence, EVIDENCE_CALIBRATION, 0.0f);
+}
+
 /* How far the gain of measured over expected is from 1, less `sure` times what else is measured, both rms. */
 static float agreement_away(const agreement_t *agreement, float sure)
 {
@@ -384,6 +390,9 @@ void evidence_begin_change(evidence_t *evidence, bool known, bool opened)
     evidence->since_change = known ? 0.0f : PROBATION;
     evidence->opened = opened;
     evidence_note(evidence, EVIDENCE_REGRIP, known);
+    if (opened) { /* what was seen of the calibration was seen with the other arm */
+        evidence_start_calibration(evidence);
+    }
 }
 
 float evidence_of_torque(const evidence_t *evidence)

@@ -191,6 +191,9 @@ bool evidence_of_change(
 /* The pilot changed just now; `opened`: to another one. An arm that is not known yet does not grip anew. */
 void evidence_begin_change(evidence_t *evidence, bool known, bool opened);
 
+/* What was seen of the calibration does not count any more. */
+void evidence_start_calibration(evidence_t *evidence);
+
 /* How much torque the lever is moved by that nobody knows, 0 to 1: as far as innovations are larger than expected. */
 float evidence_of_torque(const evidence_t *evidence);
 

@@ -90,8 +90,7 @@ static void estimate_noise(learning_t *learning, const setup_t *setup, cdkf_t *c
     if (!grown && !verdict_rows[learning->verdict].adapt) {
         noise_estimation_begin(&learning->noise);
     } else if (noise_estimation_step(&learning->noise, cdkf, &noise, period)) {
-        calibration_start(&learning->evidence.calibration);
-        evidence_set(&learning->evidence, EVIDENCE_CALIBRATION, 0.0f);
+        evidence_start_calibration(&learning->evidence);
         if (!grown && !is_known(learning)) { /* what was learnt from the start with noise that was far too small */
             restore(learning, cdkf);
         }

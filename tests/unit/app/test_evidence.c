@@ -706,6 +706,19 @@ TEST(a_change_passes_through_its_stages)
     }
 }
 
+/* A sensor that fits neither of two pilots is found again; what one of them looked like says nothing of the other. */
+TEST(calibration_is_judged_anew_with_another_pilot_and_not_when_one_has_changed)
+{
+    for (uint32_t opened = 0u; opened < 2u; opened++) {
+        setUp();
+        evidence.calibration.score[CDKF_BASE_GAIN] = (score_t){1.0e3f, 1.0f};
+        evidence_set(&evidence, EVIDENCE_CALIBRATION, 2.0f);
+        evidence_begin_change(&evidence, true, opened == 1u);
+        TEST_ASSERT_EQUAL(opened == 0u, evidence_has(&evidence, EVIDENCE_CALIBRATION));
+        TEST_ASSERT_EQUAL(opened == 0u, evidence.calibration.score[CDKF_BASE_GAIN].vector > 0.0f);
+    }
+}
+
 /* A drift of so many standard deviations; again only after change_memory, while hands are on and the base is not in
  * doubt. */
 TEST(a_change_is_found_once_and_not_while_something_else_is_to_be_judged_first)
