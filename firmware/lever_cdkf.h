@@ -131,10 +131,10 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance: 2,400 bytes, and as much more as pointers are longer than 32 bits. */
+/* Room for one instance: 2,416 bytes, and as much more as pointers are longer than 32 bits. */
 typedef struct lever_room {
     const void *pointers[4];
-    uint8_t rest[2384];
+    uint8_t rest[2400];
 } lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
@@ -318,8 +318,9 @@ typedef struct lever_correction {
 } lever_correction_t;
 
 /* After the last sample, or lever_idle(). It fades in within a second while a command was accepted within the last
- * second, as for torque, and is 0 within 100 ms after that has ended, or a sensor, the sample clock or the samples
- * have failed; whoever gets none for 100 ms takes 0. */
+ * second, as for torque, and is 0 within 100 ms after that has ended, or theta, theta_dot, z_ddot, the sample clock or
+ * the samples have failed: bounce/README.md says when. Where only the response to z_ddot is wrong, it goes on by what
+ * the lever does. Whoever gets none for 100 ms takes 0. */
 void lever_correction(const lever_t *lever, lever_correction_t *correction);
 
 /* --- evidence --------------------------------------------------------------------------------------------------- */
@@ -480,7 +481,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 2098 };
+enum lever_state_limits { LEVER_STATE_BYTES = 2114 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

@@ -30,9 +30,11 @@
 #define KINEMATICS_BLOCK 0.02f  /* more often than this the sums hardly get new information [s] */
 #define KINEMATICS_BLOCKS 6.0f  /* from which on the gain has a standard deviation */
 #define KINEMATICS_SURE 2.0f    /* standard deviations that the gain may be off */
+#define LEVEL_SHARE 0.02f       /* of a torque's level, by one sample in EVIDENCE_TORQUE_EVERY */
 #define OTHER_SHARE 0.01f       /* of its mean, by one sample in EVIDENCE_TORQUE_EVERY */
 #define OTHER_LEAST 2.5e-3f     /* mean square that is more than noise of the sensor [N^2 m^2] */
 #define OFFSET_MAX 0.02f        /* of theta: f_n, which is that at the angle shown, is off by its sigma [rad] */
+#define LAPSE 10.0f             /* what nothing has confirmed for so long holds no more [s] */
 #define AWAKE 0.3f              /* a rest lasts so much longer than the lack of motion [s] [rest_120s, freed] */
 #define REGRIP_TIME 0.038f      /* two blocks: a new grip is complete [s] [grip_step] */
 #define PROBATION 0.29f         /* until then a change has to explain the innovations [s] [rough_begins] */
@@ -122,7 +124,11 @@ void evidence_follow_command(evidence_t *evidence, float commanded, float elapse
 void evidence_add_torque(evidence_t *evidence, float measured)
 {
     const float other = measured - evidence->commanded;
-    agreement_add(&evidence->torque, evidence->commanded, measured);
+    const float expected = evidence->commanded - evidence->commanded_level;
+    const float deviation = measured - evidence->measured_level;
+    agreement_add(&evidence->torque, expected, deviation);
+    evidence->commanded_level += LEVEL_SHARE * expected;
+    evidence->measured_level += LEVEL_SHARE * deviation;
     evidence->other_torque += OTHER_SHARE * ((other * other) - evidence->other_torque);
 }
 
@@ -201,6 +207,14 @@ static bool base_goes_on(motion_t *motion, const stillness_t *base, float period
     return motion->base_fast > (BASE_LESS * motion->base_slow);
 }
 
+/* Forgets what was seen of the base: the arm has changed, or is not known yet. */
+static void trust_base(evidence_t *evidence)
+{
+    (void)memset(&evidence->base, 0, sizeof evidence->base);
+    evidence->base_unheard = 0.0f;
+    evidence_set(evidence, EVIDENCE_BASE, 0.0f);
+}
+
 static void judge_base(evidence_t *evidence, const score_t *sudden, float period)
 {
     score_t *base = &evidence->base;
@@ -210,7 +224,9 @@ static void judge_base(evidence_t *evidence, const score_t *sudden, float period
     base->vector = (keep * base->vector) + sudden->vector;
     base->information = (keep * base->information) + sudden->information;
     evidence->ratio[EVIDENCE_BASE] = 0.0f;
+    evidence->base_unheard += period;
     if ((base->information * (BASE_DOUBT * BASE_DOUBT)) > 1.0f) {
+        evidence->base_unheard = 0.0f;
         const float gain = (before ? 0.0f : 1.0f) - (base->vector / base->information);
         const float away = fabsf(gain - 1.0f);
         evidence->ratio[EVIDENCE_BASE] = lesser(away * rows[EVIDENCE_BASE].inverse, 1.0f); /* not sure yet */
@@ -221,13 +237,9 @@ static void judge_base(evidence_t *evidence, const score_t *sudden, float period
     if (evidence_has(evidence, EVIDENCE_BASE) != before) {
         (void)memset(base, 0, sizeof *base);
     }
-}
-
-/* Forgets what was seen of the base: the arm has changed, or is not known yet. */
-static void trust_base(evidence_t *evidence)
-{
-    (void)memset(&evidence->base, 0, sizeof evidence->base);
-    evidence_set(evidence, EVIDENCE_BASE, 0.0f);
+    if (evidence->base_unheard > LAPSE) {
+        trust_base(evidence);
+    }
 }
 
 void evidence_start_calibration(evidence_t *evidence)
@@ -275,10 +287,17 @@ static void judge_kinematics(evidence_t *evidence, float period, float sample_pe
     of->fourth = (keep * keep * of->fourth) + (square * square);
     const float expected = of->agreement.expected;
     const float blocks = (expected * expected) * lesser(period * (1.0f / KINEMATICS_BLOCK), 1.0f);
-    if ((expected > least) && (blocks > (KINEMATICS_BLOCKS * of->fourth))) { /* else it stays as it is */
+    of->unheard += period;
+    if ((expected > least) && (blocks > (KINEMATICS_BLOCKS * of->fourth))) { /* else it stays as it is for a while */
+        of->unheard = 0.0f;
         const float inverse = of->fourth / blocks;
         const float sure = (KINEMATICS_SURE * sqrtf(inverse)) / (1.0f - (2.0f * inverse));
         evidence_set(evidence, EVIDENCE_KINEMATICS, agreement_away(&of->agreement, sure));
+    } else if (of->unheard > LAPSE) {
+        of->unheard = 0.0f;
+        evidence_set(evidence, EVIDENCE_KINEMATICS, 0.0f);
+    } else {
+        /* not sure */
     }
     agreement_forget(&of->agreement, keep);
 }

@@ -50,6 +50,7 @@ typedef struct kinematics {
     float sum[2];          /* and what is left, over the samples of a block */
     agreement_t agreement; /* of the angle with the integral, by their sums over a block, */
     float fourth;          /* sum of the integral to the fourth: how many blocks the agreement rests on */
+    float unheard;         /* time for which they have not been enough [s] */
 } kinematics_t;
 
 typedef struct motion {
@@ -75,8 +76,11 @@ typedef struct evidence {
     float refused[CDKF_OUTPUTS]; /* time for which samples of an output have been refused [s] */
     input_gate_t input[INPUT_COUNT];
     score_t base;       /* of CDKF_BASE_GAIN, with exponential forgetting */
-    agreement_t torque; /* measured with commanded [N m] */
+    float base_unheard; /* time for which it has said nothing [s] */
+    agreement_t torque; /* measured with commanded, each less its level [N m]: a bias does not hide a motor */
     float commanded;    /* as a motor follows it [N m] */
+    float commanded_level;
+    float measured_level;
     float other_torque; /* mean square of what the motor was not asked for, while it was measured [N^2 m^2] */
     kinematics_t kinematics;
     change_detection_t change;

@@ -374,16 +374,32 @@ TEST(angle_and_rate_that_do_not_agree_say_nothing_of_the_base)
     TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_KINEMATICS));
 }
 
-/* Two seconds of samples of 1 ms in blocks of 20: asked is a sine of 3 Hz, measured a gain times that and a sine of
- * 4 Hz. Returns after how many blocks it was wrong, 0: never. */
-static uint32_t torque_wrong_after(double amplitude, double gain, double other)
+/* R35: without motion nothing would ever say that a sensor is right again, and torque, which might, waits for that. */
+TEST(what_nothing_confirms_for_ten_seconds_holds_no_more)
+{
+    static const enum evidence_id which[] = {EVIDENCE_KINEMATICS, EVIDENCE_BASE};
+    for (uint32_t i = 0u; i < (sizeof which / sizeof which[0]); i++) {
+        for (uint32_t k = 0u; k < 2u; k++) {
+            setUp();
+            evidence_note(&evidence, which[i], true);
+            for (uint32_t n = 0u; n < (490u + (20u * k)); n++) {
+                end_block();
+            }
+            TEST_ASSERT_EQUAL(k == 0u, evidence_has(&evidence, which[i]));
+        }
+    }
+}
+
+/* Two seconds of samples of 1 ms in blocks of 20: asked is a sine of 3 Hz, measured a gain times that, a sine of 4 Hz
+ * and a bias. Returns after how many blocks it was wrong, 0: never. */
+static uint32_t torque_wrong_with_bias(double amplitude, double gain, double other, double bias)
 {
     uint32_t after = 0u;
     for (uint32_t block = 1u; block <= 100u; block++) {
         for (uint32_t k = 0u; k < 20u; k++) {
             const double time = 1.0e-3 * (double)((20u * block) + k);
             const double asked = amplitude * sin(6.283185307 * 3.0 * time);
-            const double measured = (gain * asked) + (other * sin(6.283185307 * 4.0 * time));
+            const double measured = (gain * asked) + (other * sin(6.283185307 * 4.0 * time)) + bias;
             evidence_follow_command(&evidence, (float)asked, 1.0f);
             if ((k % (uint32_t)EVIDENCE_TORQUE_EVERY) == 0u) {
                 evidence_add_torque(&evidence, (float)measured);
@@ -396,6 +412,33 @@ static uint32_t torque_wrong_after(double amplitude, double gain, double other)
         }
     }
     return after;
+}
+
+static uint32_t torque_wrong_after(double amplitude, double gain, double other)
+{
+    return torque_wrong_with_bias(amplitude, gain, other, 0.0);
+}
+
+/* R37: a bias of the sensor, or a constant torque, neither hides a motor that does other than it is asked nor is one. */
+TEST(a_bias_of_the_torque_hides_no_motor)
+{
+    static const double gain[] = {-1.0, 0.0, 2.0, 1.0};
+    for (uint32_t i = 0u; i < (sizeof gain / sizeof gain[0]); i++) {
+        setUp();
+        (void)torque_wrong_with_bias(0.3, 1.0, 0.0, 1.0);
+        TEST_ASSERT_EQUAL_UINT32(0u, torque_wrong_with_bias(0.3, 1.0, 0.0, 1.0));
+        (void)torque_wrong_with_bias(0.3, gain[i], 0.0, 1.0);
+        TEST_ASSERT_EQUAL(gain[i] != 1.0, evidence_has(&evidence, EVIDENCE_MOTOR));
+    }
+}
+
+/* R32: it holds one value from now on, which may be far from the last. */
+TEST(a_torque_that_stays_what_it_is_is_wrong)
+{
+    setUp();
+    (void)torque_wrong_after(0.3, 1.0, 0.0);
+    TEST_ASSERT_UINT32_WITHIN(35u, 40u, torque_wrong_with_bias(0.3, 0.0, 0.0, 0.3));
+    TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_MOTOR));
 }
 
 TEST(a_torque_that_does_not_follow_what_is_asked_is_wrong)
