@@ -15,7 +15,7 @@ ACCEPT = "cmake --build build --target budget-accept"
 
 LIMITS = {
     "instructions.dual.lever.mean": 2850,
-    "instructions.dual.lever.worst": 8700,
+    "instructions.dual.lever.worst": 8750,
     "instructions.dual.lever.start_up_worst": 8050,
     "instructions.tick.dual.lever.mean": 4250,
     "instructions.bounce.dual.lever.mean": 3900,
