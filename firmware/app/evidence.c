@@ -34,7 +34,7 @@
 #define OTHER_SHARE 0.01f       /* of its mean, by one sample in EVIDENCE_TORQUE_EVERY */
 #define OTHER_LEAST 2.5e-3f     /* mean square that is more than noise of the sensor [N^2 m^2] */
 #define OFFSET_MAX 0.02f        /* of theta: f_n, which is that at the angle shown, is off by its sigma [rad] */
-#define LAPSE 10.0f             /* what nothing has confirmed for so long holds no more [s] */
+#define LAPSE 30.0f             /* what nothing has confirmed for so long holds no more [s] */
 #define AWAKE 0.3f              /* a rest lasts so much longer than the lack of motion [s] [rest_120s, freed] */
 #define REGRIP_TIME 0.038f      /* two blocks: a new grip is complete [s] [grip_step] */
 #define PROBATION 0.29f         /* until then a change has to explain the innovations [s] [rough_begins] */
