@@ -127,14 +127,18 @@ static bool follow_input(float *missing, bool valid, float elapsed)
     return back;
 }
 
-/* An angle that has jumped while the rate went on, and stays there, has another offset: its level takes it. */
+/* An angle that has jumped while the rate went on, and stays there, has another offset, and so has one that is back from
+ * an outage elsewhere: its level takes it, which would pass on some of a jump for longer than levels settle. */
 static void take_offset(estimator_t *estimator, const checked_t *sample)
 {
     trim_t *trim = &estimator->trim;
     evidence_t *evidence = &estimator->learning.evidence;
-    const bool believed = sample->valid[0] && (evidence->refused[0] > 0.0f);
-    const float jump = sample->y[0] - (trim->last[0] + (trim->missing[0] * sample->y[1]));
-    if (believed && sample->valid[1] && (evidence->refused[1] <= 0.0f) && trim->deviations && (fabsf(jump) > JUMP)) {
+    const bool back = trim_is_waiting(trim, 0u);
+    const bool goes_on = (evidence->refused[0] > 0.0f) && sample->valid[1] && (evidence->refused[1] <= 0.0f);
+    const float expected = back ? (trim->origin[0] + estimator->cdkf.x[0]) /* only the rate is known to go on */
+                                : (trim->last[0] + (trim->missing[0] * sample->y[1]));
+    const float jump = sample->y[0] - expected;
+    if (sample->valid[0] && (back || goes_on) && trim->deviations && (fabsf(jump) > JUMP)) {
         trim_shift(trim, jump);
         evidence->offset += jump;
         evidence->faults |= LEVER_FAULT_THETA; /* until the end of the block, which judges what is left */

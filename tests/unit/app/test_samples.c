@@ -377,6 +377,25 @@ TEST(what_is_left_of_an_offset_counts)
     }
 }
 
+/* An angle that is back from an outage where it was not expected, as a sensor that read a constant, is where it is now:
+ * what the levels would pass on of the jump would be taken for motion. */
+/* R33 */
+TEST(an_angle_that_is_back_elsewhere_teaches_nothing)
+{
+    const uint32_t wrong = (uint32_t)LEVER_FAULT_INNOVATION | (uint32_t)LEVER_FAULT_CHANGE |
+                           (uint32_t)LEVER_FAULT_MISMATCH | (uint32_t)LEVER_FAULT_BASE;
+    run_both(8000u);
+    for (uint32_t k = 0u; k < 500u; k++) {
+        lever_sample_t sample = sample_after(1u);
+        (void)lever_update(other, &sample);
+        sample.theta_valid = false;
+        (void)lever_update(lever, &sample);
+    }
+    TEST_ASSERT_EQUAL_UINT32(0u, run_off(2000u, 0.3f) & wrong);
+    TEST_ASSERT_FLOAT_WITHIN(0.02f * estimate_of(other).natural_frequency, estimate_of(other).natural_frequency,
+        estimate().natural_frequency);
+}
+
 /* The pilot moves the lever as fast: rate and angle agree, whatever the filter expected, and no offset is taken. */
 TEST(an_angle_that_the_rate_explains_has_no_other_offset)
 {
