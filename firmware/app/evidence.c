@@ -224,21 +224,22 @@ static void judge_base(evidence_t *evidence, const score_t *sudden, float period
     base->vector = (keep * base->vector) + sudden->vector;
     base->information = (keep * base->information) + sudden->information;
     evidence->ratio[EVIDENCE_BASE] = 0.0f;
-    evidence->base_unheard += period;
     if ((base->information * (BASE_DOUBT * BASE_DOUBT)) > 1.0f) {
-        evidence->base_unheard = 0.0f;
         const float gain = (before ? 0.0f : 1.0f) - (base->vector / base->information);
         const float away = fabsf(gain - 1.0f);
+        evidence->base_unheard = 0.0f;
         evidence->ratio[EVIDENCE_BASE] = lesser(away * rows[EVIDENCE_BASE].inverse, 1.0f); /* not sure yet */
         if ((base->information * (sure * sure)) > 1.0f) {
             evidence_set(evidence, EVIDENCE_BASE, away);
         }
+    } else {
+        evidence->base_unheard += period;
+        if (evidence->base_unheard > LAPSE) {
+            trust_base(evidence);
+        }
     }
     if (evidence_has(evidence, EVIDENCE_BASE) != before) {
         (void)memset(base, 0, sizeof *base);
-    }
-    if (evidence->base_unheard > LAPSE) {
-        trust_base(evidence);
     }
 }
 
@@ -287,17 +288,16 @@ static void judge_kinematics(evidence_t *evidence, float period, float sample_pe
     of->fourth = (keep * keep * of->fourth) + (square * square);
     const float expected = of->agreement.expected;
     const float blocks = (expected * expected) * lesser(period * (1.0f / KINEMATICS_BLOCK), 1.0f);
-    of->unheard += period;
-    if ((expected > least) && (blocks > (KINEMATICS_BLOCKS * of->fourth))) { /* else it stays as it is for a while */
-        of->unheard = 0.0f;
+    if ((expected > least) && (blocks > (KINEMATICS_BLOCKS * of->fourth))) {
         const float inverse = of->fourth / blocks;
         const float sure = (KINEMATICS_SURE * sqrtf(inverse)) / (1.0f - (2.0f * inverse));
-        evidence_set(evidence, EVIDENCE_KINEMATICS, agreement_away(&of->agreement, sure));
-    } else if (of->unheard > LAPSE) {
         of->unheard = 0.0f;
-        evidence_set(evidence, EVIDENCE_KINEMATICS, 0.0f);
-    } else {
-        /* not sure */
+        evidence_set(evidence, EVIDENCE_KINEMATICS, agreement_away(&of->agreement, sure));
+    } else { /* it stays as it is, for a while */
+        of->unheard += period;
+        if (of->unheard > LAPSE) {
+            evidence_set(evidence, EVIDENCE_KINEMATICS, 0.0f);
+        }
     }
     agreement_forget(&of->agreement, keep);
 }

@@ -135,13 +135,15 @@ static void take_offset(estimator_t *estimator, const checked_t *sample)
     evidence_t *evidence = &estimator->learning.evidence;
     const bool back = trim_is_waiting(trim, 0u);
     const bool goes_on = (evidence->refused[0] > 0.0f) && sample->valid[1] && (evidence->refused[1] <= 0.0f);
-    const float expected = back ? (trim->origin[0] + estimator->cdkf.x[0]) /* only the rate is known to go on */
-                                : (trim->last[0] + (trim->missing[0] * sample->y[1]));
-    const float jump = sample->y[0] - expected;
-    if (sample->valid[0] && (back || goes_on) && trim->deviations && (fabsf(jump) > JUMP)) {
-        trim_shift(trim, jump);
-        evidence->offset += jump;
-        evidence->faults |= LEVER_FAULT_THETA; /* until the end of the block, which judges what is left */
+    if (sample->valid[0] && (back || goes_on) && trim->deviations) {
+        const float expected =
+            back ? (trim->origin[0] + estimator->cdkf.x[0]) : (trim->last[0] + (trim->missing[0] * sample->y[1]));
+        const float jump = sample->y[0] - expected;
+        if (fabsf(jump) > JUMP) {
+            trim_shift(trim, jump);
+            evidence->offset += jump;
+            evidence->faults |= LEVER_FAULT_THETA; /* until the end of the block, which judges what is left */
+        }
     }
 }
 
@@ -160,7 +162,9 @@ static void refuse_spikes(estimator_t *estimator, checked_t *sample, float elaps
             estimator->faults |= (i == 0u) ? (uint32_t)LEVER_FAULT_THETA : (uint32_t)LEVER_FAULT_THETA_DOT;
         }
     }
-    take_offset(estimator, sample);
+    if ((estimator->learning.evidence.refused[0] + estimator->trim.missing[0]) > 0.0f) {
+        take_offset(estimator, sample);
+    }
 }
 
 void prediction_advance(
