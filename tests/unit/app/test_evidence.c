@@ -374,7 +374,8 @@ TEST(angle_and_rate_that_do_not_agree_say_nothing_of_the_base)
     TEST_ASSERT_TRUE(evidence_has(&evidence, EVIDENCE_KINEMATICS));
 }
 
-/* R35: without motion nothing would ever say that a sensor is right again, and torque, which might, waits for that. */
+/* Without motion nothing would ever say that a sensor is right again, and torque, which might, waits for that. */
+/* R35 */
 TEST(what_nothing_confirms_for_half_a_minute_holds_no_more)
 {
     static const enum evidence_id which[] = {EVIDENCE_KINEMATICS, EVIDENCE_BASE};
@@ -419,7 +420,8 @@ static uint32_t torque_wrong_after(double amplitude, double gain, double other)
     return torque_wrong_with_bias(amplitude, gain, other, 0.0);
 }
 
-/* R37: a bias of the sensor, or a constant torque, neither hides a motor that does other than it is asked nor is one. */
+/* A bias of the sensor, or a constant torque, neither hides a motor that does other than it is asked nor is one. */
+/* R37 */
 TEST(a_bias_of_the_torque_hides_no_motor)
 {
     static const double gain[] = {-1.0, 0.0, 2.0, 1.0};
@@ -432,7 +434,8 @@ TEST(a_bias_of_the_torque_hides_no_motor)
     }
 }
 
-/* R32: it holds one value from now on, which may be far from the last. */
+/* It holds one value from now on, which may be far from the last. */
+/* R32 */
 TEST(a_torque_that_stays_what_it_is_is_wrong)
 {
     setUp();
