@@ -31,9 +31,9 @@ def number(value: Any, digits: int = 3) -> str:
     return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
 
 
-def fixed(value: float | None, decimals: int) -> str:
-    """Return a figure with so many decimals; a dash for one that is not there."""
-    return NOTHING if value is None else f"{value:.{decimals}f}"
+def fixed(value: float | None, decimals: int, unit: str = "") -> str:
+    """Return a figure with so many decimals and its unit; a dash for one that is not there."""
+    return NOTHING if value is None else f"{value:.{decimals}f}{unit}"
 
 
 def percent(fraction: float | None) -> str:
@@ -112,7 +112,7 @@ def _accuracy(run: Run, judged: list[Quantity]) -> tuple[str, str]:
         rows.append(
             (
                 f"{quantity.symbol} {quantity.name}",
-                f"{fixed(figures.rms_percent, 1)} %",
+                fixed(figures.rms_percent, 1, " %"),
                 percent(figures.coverage_2sigma),
                 seconds(figures.time_to_10_percent_s),
             )

@@ -127,6 +127,15 @@ def test_the_answer_says_what_the_summary_says(page: Reader, result: SimulationR
     assert re.sub(r"\b([mck])_p\b", r"\1p", verdict) in text
 
 
+def test_what_a_short_run_cannot_say_is_a_dash_without_a_unit(result: SimulationResult) -> None:
+    figures = {
+        name: replace(each, rms_percent=None, coverage_2sigma=None) for name, each in result.summary.parameters.items()
+    }
+    shown = summary_html.answer(Run(result.trace, replace(result.summary, parameters=figures)))
+    assert "– %" not in shown.replace("\u00a0", " ")
+    assert "–" in shown
+
+
 @pytest.mark.parametrize(
     ("passed", "error", "covered", "white", "mood"),
     [
