@@ -66,7 +66,7 @@ class Source(ABC):
         self.error: str | None = None
         """Why not, when something went wrong."""
         self.warning: str | None = None
-        """What is wrong with a part of it; the rest is used."""
+        """A fault in a part of it, of which the rest is used."""
         self._waiting: deque[Frame] = deque(maxlen=MOST_WAITING)
         self._start = time.monotonic()
         self._switch_interval: float | None = None  # of before start()
