@@ -75,9 +75,9 @@ class Plan:
         Raise LeverError when files of another campaign, or another command, are there.
         """
         numbers = set()
-        for name in (SPEC, SUMMARY):
-            if (folder / name).exists() and not self.spec.is_kept_in(folder):
-                raise LeverError(f"{folder} holds another campaign, or another command's run ({name}): {_REMEDY}")
+        present = [name for name in (SPEC, SUMMARY) if (folder / name).exists()]
+        if present and not self.spec.is_kept_in(folder):
+            raise LeverError(f"{folder} holds another campaign, or another command's run ({present[0]}): {_REMEDY}")
         for file in _listed(folder):
             match = _NAME.fullmatch(file.name)
             if match is None or match[1] != self.fingerprint:
