@@ -115,6 +115,13 @@ static inline void evidence_note(evidence_t *evidence, enum evidence_id which, b
     evidence->present = present ? (evidence->present | bit) : (evidence->present & ~bit);
 }
 
+/* Whether a parameter rests on a bound. While innovations are coloured, too, no arm explains how the lever moves. */
+static inline void evidence_note_bound(evidence_t *evidence, bool bounded)
+{
+    evidence_note(evidence, EVIDENCE_BOUND, bounded);
+    evidence_note(evidence, EVIDENCE_UNEXPLAINED, bounded && evidence_has(evidence, EVIDENCE_COLOUR));
+}
+
 /* --- with each sample --------------------------------------------------------------------------------------------- */
 
 /* The evidence that a signal is stuck. */

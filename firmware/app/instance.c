@@ -82,6 +82,15 @@ static enum lever_mode update(lever_t *lever, const lever_sample_t *sample)
     return mode;
 }
 
+/* Damping by a motor that may do the reverse does harm. */
+static void note_damping(lever_t *lever)
+{
+    const uint32_t forbids = verdict_rows[lever->estimator.learning.verdict].torque;
+    if (mitigation_has_damping(lever->bounce.chosen) && !verdict_permits(forbids, VERDICT_DAMPING)) {
+        lever->to_gate.harmful = true;
+    }
+}
+
 /* Called in sequence rather than nested, to bound peak stack. */
 enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
 {
@@ -89,6 +98,7 @@ enum lever_mode instance_update(lever_t *lever, const lever_sample_t *sample)
     const enum lever_mode mode = update(lever, sample);
     if (bounce->mitigates) {
         bounce_mitigate(bounce, &lever->estimator, &lever->gate, &lever->to_gate);
+        note_damping(lever);
     }
     torque_gate_step(&lever->gate, dither_step(&lever->dither) + bounce->mitigation.damping, &lever->to_gate);
     if (bounce->aircraft != NULL) {

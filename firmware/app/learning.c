@@ -132,7 +132,7 @@ static void learn(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, cons
                                 : disturb_unknown(learning, setup->settings, cdkf);
         }
     }
-    evidence_note(&learning->evidence, EVIDENCE_BOUND, correction.bounded);
+    evidence_note_bound(&learning->evidence, correction.bounded);
     for (uint32_t i = 0u; i < (uint32_t)MODEL_PARAMETERS; i++) {
         variance[i] = adaptation.floor[i] * walk;
     }
@@ -180,7 +180,7 @@ static void end_block(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, 
     }
     if (held) {
         noise_estimation_begin(&learning->noise);
-        evidence_note(evidence, EVIDENCE_BOUND, scaling_bound(&cdkf->scaling, cdkf->w));
+        evidence_note_bound(evidence, scaling_bound(&cdkf->scaling, cdkf->w));
         keep(learning, cdkf, block.period, true);
     } else {
         estimate_noise(learning, setup, cdkf, block.period);

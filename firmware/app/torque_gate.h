@@ -5,8 +5,8 @@
  *   - the mode, the sample clock and the machine permit it: torque_sample_t;
  *   - a sample with a valid output came within 20 ms or three sample periods, whichever is longer;
  *   - a command was accepted within the last second (keep-alive);
- *   - it is not barred. Evidence that torque does harm, as the motor does not do what it is asked or nobody holds the
- *     lever, bars it; a command that asks for torque anew ends that, once the evidence is gone.
+ *   - it is not barred. A verdict that forbids torque, as the motor does not do what it is asked or nobody holds the
+ *     lever, bars it; a command that asks for torque anew ends that, once the verdict is another.
  * Otherwise torque goes to exactly zero on a straight line within 40 ms, even if torque_slew is less than that takes.
  * Closing needs no sample: the port calls torque_gate_idle(). Opening takes dither_fade.
  *
@@ -52,7 +52,7 @@ typedef struct torque_sample {
     bool advances;       /* it does */
     bool measured;       /* theta or theta_dot is valid */
     bool permitted;      /* mode RUN or FROZEN (or COAST, which `measured` ends), no fault of the machine */
-    bool harmful;        /* the motor has been found wrong, or nobody holds the lever */
+    bool harmful;        /* what the verdict forbids torque for */
 } torque_sample_t;
 
 /* Closed. */

@@ -9,6 +9,7 @@
 #define LEVELS ACTION_LEVELS
 #define NEVER VERDICT_NEVER
 #define ALWAYS 0u /* no fault forbids it */
+#define UNDAMPED VERDICT_DAMPING
 /* The clock advances, and the filter was not just restarted. */
 #define RUNNING ((uint32_t)LEVER_FAULT_CLOCK | (uint32_t)LEVER_FAULT_RECOVERED)
 /* That, and theta and the base are measured, and no parameter rests on a bound. */

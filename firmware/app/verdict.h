@@ -39,7 +39,8 @@ typedef struct verdict_row {
 
 extern const verdict_row_t verdict_rows[VERDICT_COUNT];
 
-#define VERDICT_NEVER 0x80000000u /* forbids it with any faults */
+#define VERDICT_NEVER 0x80000000u   /* forbids it with any faults */
+#define VERDICT_DAMPING 0x40000000u /* among the faults: damping is chosen, and depends on the sign of torque */
 
 /* Whether an action of a row is permitted with these faults. */
 static inline bool verdict_permits(uint32_t forbidding, uint32_t faults)

@@ -15,7 +15,7 @@ void calibration_start(calibration_t *calibration)
 
 float calibration_step(calibration_t *calibration, const cdkf_t *cdkf, float period)
 {
-    const float keep = 1.0f - (period / CALIBRATION_MEMORY);
+    const float keep = 1.0f - (period * (1.0f / CALIBRATION_MEMORY));
     float largest = 0.0f;
     for (uint32_t c = 0u; c < (uint32_t)CDKF_CALIBRATION; c++) {
         const score_t score = cdkf_constant_score(cdkf, c);

@@ -190,6 +190,9 @@ def stands(flight: Flight) -> list[str]:
         for name, fault in states[: 1 if own else 2]:
             must |= {name} if always[row] & fault else set()
             may |= {name} if ever[row] & fault else set()
+        no_arm = BOUND | MISMATCH
+        must |= {"unexplained"} if always[row] & no_arm == no_arm else set()
+        may |= {"unexplained"} if ever[row] & no_arm == no_arm else set()
         at = int(flight.read[row])
         must |= {"rest"} if rested[max(0, at - RESTED + 2 * BLOCK) : at + 1].any() else set()
         may |= {"rest"} if rests[max(0, at - RESTED - BLOCK - READ) : at + 1].any() else set()
@@ -198,9 +201,10 @@ def stands(flight: Flight) -> list[str]:
         blind = _blind(flight, sample)
         must |= {"missing"} if blind == 2 else set()
         may |= {"missing"} if blind else set()
-        if present[row, INDEX["hands"]]:
+        opened = verdict == RANK["unexplained"]
+        if present[row, INDEX["hands"]] or opened:
             held = sample  # guess: a new hold counts as a change
-        if present[row, INDEX["hands"]] or present[row, INDEX["sticking"]] or first_guess[row]:
+        if present[row, INDEX["hands"]] or present[row, INDEX["sticking"]] or opened or first_guess[row]:
             known = -(10**6)  # guess: what was opened is new; how long, no text says
         if min(sample - changed, sample - held) <= CONFIRMED + 3 * BLOCK:
             may.add("regrip")

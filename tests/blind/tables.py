@@ -68,6 +68,7 @@ VERDICTS = (
     Verdict("blind", ("missing",)),
     Verdict("settling", ("unsettled",)),
     Verdict("rest", ("rest",)),
+    Verdict("unexplained", ("unexplained",), learn=True, entry="open"),
     Verdict("regrip", ("regrip",), entry="inflate", exit="levels"),
     Verdict("new", ("new",), learn=True),
     Verdict("learning", (), learn=True),

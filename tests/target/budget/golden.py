@@ -18,7 +18,7 @@ LIMITS = {
     "instructions.dual.lever.worst": 8750,
     "instructions.dual.lever.start_up_worst": 8050,
     "instructions.tick.dual.lever.mean": 4250,
-    "instructions.bounce.dual.lever.mean": 3900,
+    "instructions.bounce.dual.lever.mean": 3920,
     "instructions_after_gap.dual": 20000,
     "cycles.dual.lever.mean": 4400,
     "init.instructions": 100_000,

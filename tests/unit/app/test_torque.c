@@ -218,16 +218,16 @@ TEST(no_command_brings_torque_back_in_fault)
 
 /* --- evidence that it does harm ------------------------------------------------------------------------------------ */
 
-/* Samples with a motor that does so many times what it is asked, kept alive; until the gate is as it is to be. Returns
- * how many. */
-static uint32_t fly_motor(float gain, bool valid, bool open, uint32_t most)
+/* Samples with a motor that does so many times what it is asked, and a sensor that says so many times what it does, kept
+ * alive; until the gate is as it is to be. Returns how many. */
+static uint32_t fly_sensed_motor(float gain, float sensed, bool valid, bool open, uint32_t most)
 {
     uint32_t k = 0u;
     for (; (k < most) && (health().gate_open != open); k++) {
         const float driven = gain * torque_now();
         simulation.theta_dot += 1.0e-6 * (double)PERIOD_US * simulation.plant.torque * (double)driven;
         lever_sample_t sample = sample_after(1u);
-        sample.tau_m = driven;
+        sample.tau_m = sensed * driven;
         sample.tau_m_valid = valid;
         if ((k % 250u) == 0u) {
             dither((float)LEVER_KEEP);
@@ -236,6 +236,11 @@ static uint32_t fly_motor(float gain, bool valid, bool open, uint32_t most)
         watch_torque(torque_now(), 1000u, health().gate_open);
     }
     return k;
+}
+
+static uint32_t fly_motor(float gain, bool valid, bool open, uint32_t most)
+{
+    return fly_sensed_motor(gain, 1.0f, valid, open, most);
 }
 
 static void start_motor(float gain)
@@ -272,6 +277,42 @@ TEST_EACH(2, a_motor_of_which_nothing_bad_is_known_is_driven)
     start_motor(1.0f);
     TEST_ASSERT_EQUAL_UINT32(5000u, fly_motor(1.0f, valid, false, 5000u));
     TEST_ASSERT_EQUAL(!valid, has_fault(LEVER_FAULT_TORQUE));
+}
+
+static void damp(void)
+{
+    lever_command_t command = command_none();
+    command.mitigation = (uint8_t)LEVER_MITIGATION_DAMPING;
+    TEST_ASSERT_TRUE(lever_command(lever, &command));
+}
+
+/* From power-on, and a sensor that cannot tell: it takes the current of the motor for the torque, or there is none.
+ * Damping would drive the lever on its way. Nothing shows it but that no arm explains the motion, of which no more is
+ * known then than at the start. */
+/* R37 */
+TEST_EACH(2, a_motor_that_does_the_reverse_does_not_damp_though_no_sensor_tells)
+{
+    const bool valid = (test_round == 0u);
+    lever_estimate_t estimate;
+    start_motor(-1.0f);
+    damp();
+    TEST_ASSERT_LESS_THAN_UINT32(30000u, fly_sensed_motor(-1.0f, -1.0f, valid, false, 30000u));
+    lever_estimate(lever, &estimate);
+    TEST_ASSERT_TRUE(estimate.parameter_sigma[0] > (0.3f * estimate.parameter[0]));
+    for (uint32_t k = 0u; k < 10000u; k++) {
+        TEST_ASSERT_TRUE((k < 50u) || (torque_now() == 0.0f));
+        (void)fly_sensed_motor(-1.0f, -1.0f, valid, true, 1u);
+    }
+    dither((float)LEVER_KEEP);
+    damp();
+    TEST_ASSERT_LESS_THAN_UINT32(10u, fly_sensed_motor(-1.0f, -1.0f, valid, true, 10u));
+}
+
+TEST(a_motor_that_does_what_it_is_asked_damps)
+{
+    start_motor(1.0f);
+    damp();
+    TEST_ASSERT_EQUAL_UINT32(30000u, fly_motor(1.0f, true, false, 30000u));
 }
 
 /* A command may ask for it meanwhile, and the pilot take the lever again: only both in this order bring torque back. */

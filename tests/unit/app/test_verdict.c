@@ -20,6 +20,7 @@ static const verdict_row_t expected[VERDICT_COUNT] = {
     [VERDICT_BLIND] = {0u, ALWAYS, RUNNING, SOUND, false, false, 0u, 0u},
     [VERDICT_SETTLING] = {0u, ALWAYS, RUNNING, SOUND, false, false, 0u, 0u},
     [VERDICT_REST] = {0u, ALWAYS, RUNNING, SOUND, false, false, 0u, 0u},
+    [VERDICT_UNEXPLAINED] = {0u, ALWAYS, RUNNING, SOUND, true, true, ACTION_OPEN, 0u},
     [VERDICT_REGRIP] = {0u, ALWAYS, RUNNING, SOUND, false, false, ACTION_INFLATE, ACTION_LEVELS},
     [VERDICT_NEW] = {0u, ALWAYS, RUNNING, SOUND, true, false, 0u, 0u},
     [VERDICT_LEARNING] = {0u, ALWAYS, RUNNING, SOUND, true, true, 0u, 0u}};
@@ -48,6 +49,16 @@ TEST(every_cell_is_what_is_meant)
         check_action(expected[i].margin, row->margin);
         TEST_ASSERT_EQUAL_UINT8(expected[i].entry, row->entry);
         TEST_ASSERT_EQUAL_UINT8(expected[i].exit, row->exit);
+    }
+}
+
+/* A motor that may do the reverse does harm only where it answers the motion. */
+/* R37 */
+TEST(damping_is_forbidden_where_torque_is_and_while_no_arm_explains_the_motion)
+{
+    for (uint32_t i = 0u; i < (uint32_t)VERDICT_COUNT; i++) {
+        const bool forbidden = (expected[i].torque == NEVER) || (i == (uint32_t)VERDICT_UNEXPLAINED);
+        TEST_ASSERT_EQUAL(!forbidden, verdict_permits(verdict_rows[i].torque, VERDICT_DAMPING));
     }
 }
 
