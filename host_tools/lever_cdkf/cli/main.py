@@ -169,7 +169,7 @@ def _has_streams() -> bool:
 def _check_json(args: argparse.Namespace) -> None:
     """Before a command has worked for --json FILE; a folder that it makes itself, by --out, need not be there yet."""
     path, out = getattr(args, "json", None), getattr(args, "out", None)
-    if path is not None:
+    if path is not None and path != STANDARD_OUTPUT:
         folders = () if out is None else (Path(out).absolute(), *Path(out).absolute().parents)
         if Path(path).absolute().parent not in folders or Path(path).parent.exists():
             check_writable(path)

@@ -78,22 +78,21 @@ def json_text(content: Any) -> str:
 
 
 def write_texts(texts: Mapping[Path, str]) -> None:
-    """Write files, all or none, but for what fails when all are written. Raise LeverError."""
+    """Write files, all or none, but for what fails when all are written; then print "-". Raise LeverError."""
+    files = dict(texts)
+    printed = "" if _output is None else files.pop(Path(STANDARD_OUTPUT), "")
     with ExitStack() as stack:
-        for path, text in texts.items():
-            if _output is not None and str(path) == STANDARD_OUTPUT:
-                _output.write(text)
-                continue
+        for path, text in files.items():
             target = stack.enter_context(whole(path))
             with writing(path):
                 target.write_text(text, encoding="utf-8")
+    if _output is not None:
+        _output.write(printed)
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raise LeverError where whole() could not write: before work that would be lost. "-" is standard output."""
+    """Raise LeverError where whole() could not write: before work that would be lost."""
     final = Path(path)
-    if str(path) == STANDARD_OUTPUT:
-        return
     if final.is_dir():
         raise LeverError(f"cannot write {path}: it is a folder")
     if final.is_file() or not final.exists():

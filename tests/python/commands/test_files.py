@@ -137,6 +137,28 @@ def test_of_several_files_all_are_written_or_none(tmp_path: Path) -> None:
     assert small.read_text() == "before"
 
 
+def test_what_goes_to_standard_output_waits_for_the_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "page.html"
+    texts = {Path("-"): "rows", page: "x" * 1000}
+    with files.prints_aside():
+        with full_disk(100), pytest.raises(LeverError, match=f"cannot write {page}"):
+            write_texts(texts)
+        assert (capsys.readouterr().out, list(tmp_path.iterdir())) == ("", [])
+        write_texts(texts)
+    assert (capsys.readouterr().out, page.read_text()) == ("rows", "x" * 1000)
+
+
+def test_only_json_takes_a_dash_for_standard_output(
+    tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_texts({Path("-"): "text"})
+    assert Path("-").read_text() == "text"
+    Path("-").unlink()
+    Path("-").mkdir()
+    assert "cannot write -: it is a folder" in refused("soak", "-o", "-")
+
+
 def test_what_is_no_file_can_be_written() -> None:
     for end in os.pipe():
         check_writable(f"/dev/fd/{end}")
