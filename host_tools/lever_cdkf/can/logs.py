@@ -17,7 +17,7 @@ import os
 import stat
 import sys
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -41,6 +41,11 @@ _COMPRESSED = ".gz"
 
 class LogError(LeverError):
     """A log that cannot be read; one line with file and reason."""
+
+
+def incomplete(ends_early: Sequence[str]) -> str:
+    """Return the sentence that a log is cut off, and where; empty when it is whole."""
+    return f"The log is incomplete: {'; '.join(ends_early)}." if ends_early else ""
 
 
 class Recording:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from ..errors import LeverError
 from ..runtime.extras import missing, require
+from .layout import warn
 
 FORMATS = {"csv": "trace.csv", "mf4": "signals.mf4", "mcap": "signals.mcap", "parquet": "trace.parquet"}
 """And their files."""
@@ -35,7 +35,7 @@ def chosen_formats(args: argparse.Namespace) -> tuple[str, ...]:
             raise LeverError("--format is for the files of --out: say where these go")
         return ()
     if reason := missing("report"):
-        print(f"lever: warning: no report.html: {reason}", file=sys.stderr)
+        warn(f"no report.html: {reason}")
     chosen: tuple[str, ...] = args.format or (_DEFAULT,)
     for name in chosen:
         if name in _EXTRAS:

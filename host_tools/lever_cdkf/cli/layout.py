@@ -36,6 +36,11 @@ def say(text: str) -> None:
     print("\n".join(wrapped(text, terminal_width())))
 
 
+def warn(text: str) -> None:
+    """Print a warning to standard error, in one line."""
+    print(f"lever: warning: {text}", file=sys.stderr)
+
+
 def wrapped(text: str, width: int) -> list[str]:
     """Return lines of a text, broken at spaces, but not inside a unit. A longer word has a line of its own."""
     if text_width(text) <= width:

@@ -23,6 +23,7 @@ from ..runtime.files import STANDARD_OUTPUT, check_writable, prints_aside
 from ..runtime.provenance import version
 from ..text.suggestions import did_you_mean
 from .help_text import HelpFormatter
+from .layout import warn
 
 COMMANDS = "lever_cdkf.commands"
 """Entry point group of modules that hold sub-commands. Such a module has
@@ -197,7 +198,7 @@ def _parser() -> Parser:
         try:
             module = entry.load()
         except Exception as error:
-            print(f"lever: warning: no commands from {entry.value}: {error}", file=sys.stderr)
+            warn(f"no commands from {entry.value}: {error}")
             continue
         before = set(subparsers.choices)
         module.add_parser(subparsers)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..can.buses import add_bus_options, add_duration_option, check_others_can_be_heard, chosen_options, open_bus
-from ..cli.layout import say
+from ..cli.layout import say, warn
 from ..cli.tables import Row, Tables, add_json_option
 from ..errors import LeverError
 from .options import add_signal_options, input_files
@@ -112,7 +112,7 @@ def _mapped(log: Path, reading: Reading | None) -> Tables:
     try:
         samples = read([log], reading)
     except LeverError as error:
-        print(f"lever: record: warning: {error}", file=sys.stderr)
+        warn(str(error))
         return {}
     summary = samples.summary()
     messages: list[Row] = [{"message": name, **vars(counts)} for name, counts in summary.messages.items()]

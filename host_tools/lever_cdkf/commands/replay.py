@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..can.identifiers import add_identifier_options
 from ..cli.formats import add_format_option, chosen_formats
-from ..cli.layout import say
+from ..cli.layout import say, warn
 from ..cli.tables import Row, Tables, add_json_option
 from ..runtime.files import check_not_input
 from . import options
@@ -85,11 +85,12 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run `lever replay`; return the exit status."""
+    from ..can.logs import incomplete
     from ..cli.progress import Progress
     from ..cli.tables import print_tables
     from ..replay.engine import replay
     from ..replay.outputs import FILES
-    from ..replay.summary import failure, incomplete
+    from ..replay.summary import failure
 
     check_not_input(args.json, args.logs)
     if args.each:
@@ -103,8 +104,8 @@ def run(args: argparse.Namespace) -> int:
     say(summary.verdict)
     if args.out is not None:
         say(f"Written to {args.out}: {', '.join(name for name in FILES if (args.out / name).exists())}")
-    if said := incomplete(summary.recording):
-        print(f"lever: warning: {said}", file=sys.stderr)
+    if said := incomplete(summary.recording.ends_early):
+        warn(said)
     if not summary.passed:
         print(f"lever: replay: {failure(summary)}", file=sys.stderr)
     return 0 if summary.passed else 1

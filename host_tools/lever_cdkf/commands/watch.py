@@ -7,6 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from ..can.buses import add_bus_options, add_duration_option, check_others_can_be_heard, chosen_options
+from ..cli.layout import warn
 from ..errors import LeverError
 from ..runtime.extras import require
 from . import options
@@ -114,8 +115,7 @@ def run_monitor(args: argparse.Namespace) -> int:
         from ..watch.terminal import Monitor
 
         Monitor(source, args.duration).run()
-    source.check()
-    return 0
+    return _ended(source)
 
 
 def run_live(args: argparse.Namespace) -> int:
@@ -126,6 +126,14 @@ def run_live(args: argparse.Namespace) -> int:
     from ..watch.server import serve
 
     serve(source, config, host=args.host, port=args.port, read_only=args.read_only, duration=args.duration)
+    return _ended(source)
+
+
+def _ended(source: Source) -> int:
+    """Warn of what was wrong with a source; return the exit status. Raise LeverError when it has failed."""
+    if source.warning is not None:
+        warn(source.warning)
+    source.check()
     return 0
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..can.logs import incomplete
 from ..cli.tables import Row
 from ..errors import LeverError
 from ..firmware.quantities import Quantity, quantities
@@ -24,7 +25,7 @@ from ..runtime.extras import missing, require
 from ..runtime.files import Outputs
 from ..runtime.provenance import Provenance, provenance, with_provenance
 from .engine import Options, Progress, replay
-from .summary import failure, incomplete
+from .summary import failure
 
 PAGE = "overlay.html"
 TABLE = "logs.parquet"
@@ -80,7 +81,7 @@ def replay_each(
         try:
             each.summary = replay([log], options_of(log), None if out is None else out / name, progress, each.keep)
             failed = failure(each.summary)
-            each.failed, each.problem = bool(failed), failed or incomplete(each.summary.recording)
+            each.failed, each.problem = bool(failed), failed or incomplete(each.summary.recording.ends_early)
         except LeverError as error:
             each.failed, each.problem = True, " ".join(str(error).split())
         replays.append(each)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..can.estimator_frames import why_refused
+from ..can.logs import incomplete
 from ..firmware.native import Config, enum_names
 from ..firmware.quantities import quantities
 from ..results import bounce, nis, trust, whiteness
@@ -104,11 +105,6 @@ def failure(summary: ReplaySummary) -> str:
     return " and ".join(reasons)
 
 
-def incomplete(recording: RecordingSummary) -> str:
-    """Return that the log is cut off, and where; empty when it is whole."""
-    return f"The log is incomplete: {'; '.join(recording.ends_early)}." if recording.ends_early else ""
-
-
 def verdict(summary: ReplaySummary) -> str:
     """Return the replay in a few sentences."""
     sentences = [
@@ -164,7 +160,7 @@ def _troubles(summary: ReplaySummary) -> list[str]:
         why = why_refused(summary.corrupt, summary.late)
         troubles.append(f"{recording.refused:,} frames were refused{f': {why}' if why else ''}.")
     if recording.ends_early:
-        troubles.append(incomplete(recording))
+        troubles.append(incomplete(recording.ends_early))
     if recording.damaged_lines:
         troubles.append(f"{recording.damaged_lines} of its lines are not frames.")
     if recording.gaps:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..can import codec
 from ..can.estimator_frames import INPUTS, why_refused
+from ..can.logs import incomplete
 from ..errors import LeverError
 from ..firmware.config import Config, setting
 from ..firmware.estimator import Health
@@ -74,7 +75,7 @@ def read(
     if reading.channel is None and traffic.other_samples:
         buses = " or --channel ".join(sorted({str(traffic.channel), *traffic.other_samples}))
         raise LeverError(f"{name}: samples on more than one bus: choose by --channel {buses}")
-    notes = [f"the log is incomplete: {reason}" for reason in log.ends_early]
+    notes = list(filter(None, [incomplete(log.ends_early)]))
     notes += traffic.loaded.notes if isinstance(traffic, MappedFrames) else ()
     return replace(_recording(np.concatenate(pieces), str(traffic.channel), name), notes=tuple(notes))
 

@@ -15,7 +15,6 @@ import json
 import logging
 import signal
 import socket
-import sys
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -32,6 +31,7 @@ import tornado.web
 import tornado.websocket
 
 from .. import report
+from ..cli.layout import warn
 from ..errors import LeverError
 from ..firmware.config import Config
 from .picture import STEP
@@ -272,12 +272,11 @@ def serve(
         raise
     if not ipaddress.ip_address(server.socket.getsockname()[0].partition("%")[0]).is_loopback:
         what = "see the estimator" if not server.state.controls else "see and command the estimator"
-        print(f"lever: warning: anybody who reaches port {server.port} can {what}: no password", file=sys.stderr)
+        warn(f"anybody who reaches port {server.port} can {what}: no password")
     logging.getLogger("tornado").setLevel(logging.ERROR)
     interrupted = asyncio.run(_until_stopped(server, duration))
     if interrupted:
         raise KeyboardInterrupt
-    source.check()
 
 
 async def _until_stopped(server: Server, duration: float | None) -> bool:

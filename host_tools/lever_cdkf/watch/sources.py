@@ -93,9 +93,7 @@ class Source(ABC):
         self._thread.start()
 
     def check(self) -> None:
-        """Print its warning to standard error. Raise LeverError for its error."""
-        if self.warning is not None:
-            print(f"lever: warning: {self.warning}", file=sys.stderr)
+        """Raise LeverError for its error."""
         if self.error is not None:
             raise LeverError(self.error)
 
@@ -289,6 +287,7 @@ class LogSource(Source):
         A clock that went back or jumped far counts as 0.
         """
         from ..can.bulk import ERROR as ERROR_FRAME
+        from ..can.logs import incomplete
 
         last: int | None = None
         start_us: int | None = None
@@ -314,8 +313,7 @@ class LogSource(Source):
             raise LeverError(f"{self.title}: no CAN frame {what}")
         if self._log.damaged:
             self.warning = f"{self.title}: {self._log.damaged} lines of it are not frames"
-        if self._log.ends_early:
-            self.warning = f"the log is incomplete: {self._log.ends_early[-1]}"
+        self.warning = incomplete(self._log.ends_early) or self.warning
 
 
 def as_frame(message: can.Message) -> Frame:

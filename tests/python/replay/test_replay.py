@@ -26,6 +26,7 @@ from lever_cdkf.replay.outputs import FILES
 from lever_cdkf.replay.summary import verdict
 from lever_cdkf.report import summary_html
 from lever_cdkf.results.summary import ReplaySummary, of
+from lever_cdkf.tune import recording
 from python.conftest import Refused, Run, Session, simulated
 from python.report.reading import figures, first_number, read, unpack
 
@@ -171,7 +172,14 @@ def test_a_log_that_is_cut_off_is_used_with_a_warning(
     (tmp_path / "cut.log").write_bytes(session.log.read_bytes()[:200_017])
     status, _, err = lever(*command, tmp_path / "cut.log")
     assert status == 0
-    assert re.fullmatch(r"lever: warning: [Tt]he log is incomplete: .*cut.log: its last line has no end\.?\n", err)
+    assert re.fullmatch(r"lever: warning: The log is incomplete: .*cut\.log: its last line has no end\.\n", err)
+
+
+def test_tune_says_of_a_log_that_it_is_cut_off(session: Session, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.log"
+    cut.write_bytes(session.log.read_bytes()[:200_017])
+    assert recording.read([cut]).notes == (f"The log is incomplete: {cut}: its last line has no end.",)
+    assert recording.read([session.log]).notes == ()
 
 
 def test_the_command_that_is_proposed_tunes_the_same_part(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -21,6 +22,7 @@ from lever_cdkf.watch.transfer import FREQUENCIES
 from lever_sil.run.live_source import SimulationSource
 from lever_sil.scenarios.scenario import load
 from processes import PATIENCE
+from python.conftest import Run
 from python.watch.conftest import Flight
 
 
@@ -301,7 +303,16 @@ def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(tmp_path: Path) -> Non
     assert picture.foreign == 1
     assert source.error is None
     assert source.warning is not None
-    assert source.warning.endswith("truncated.log: its last line has no end")
+    assert source.warning.endswith("truncated.log: its last line has no end.")
+
+
+def test_a_log_that_breaks_off_while_a_page_shows_it_is_warned_of(tmp_path: Path, lever: Run) -> None:
+    log = tmp_path / "cut.log"
+    log.write_text("(1.000000) can0 123#00 R\n(1.1")
+    status, out, err = lever("live", log, "--port", "0", "--duration", "0.3")
+    assert status == 0
+    assert re.fullmatch(rf"{log}: open http://127\.0\.0\.1:\d+/ \(Ctrl-C ends\)\n", out)
+    assert err == f"lever: warning: The log is incomplete: {log}: its last line has no end.\n"
 
 
 # --- a simulation ----------------------------------------------------------------------------------------------------
