@@ -134,6 +134,45 @@ def test_keys(flight: Flight) -> None:
     asyncio.run(drive())
 
 
+def test_panels_have_titles_and_keys_go_round(flight: Flight) -> None:
+    async def drive() -> None:
+        source = Fed()
+        app = Monitor(source)
+        async with app.run_test(size=(100, 30)) as pilot:
+            fly(app, source, flight, 20)
+            text = await shown(app, pilot, r"LEVER_SAMPLE +1000 ")
+            for title in ("estimates", "health", "messages"):
+                assert re.search(rf"╭─ {title} ─", text), title
+            assert "feedthrough ─" not in text  # the terminal is not tall enough
+            for span in (120, 300, 10, 30):
+                await pilot.press("t")
+                await shown(app, pilot, rf" {span} s \[%\]")
+            await pilot.press("f")
+            assert "feedthrough ─" in await shown(app, pilot, r"coherence")
+            await pilot.resize_terminal(100, 29)
+            assert "feedthrough ─" in await shown(app, pilot, r"coherence")  # as chosen, not as the height says
+            await pilot.press("f", "space")
+            assert "feedthrough ─" not in await shown(app, pilot, "estimates \\(held: space goes on\\)")
+            await pilot.press("space")
+            assert "held" not in await shown(app, pilot, "─ estimates ─")
+
+    asyncio.run(drive())
+
+
+def test_ends_by_itself_after_the_duration(flight: Flight) -> None:
+    async def drive() -> None:
+        source = Fed()
+        app = Monitor(source, 0.2)
+        async with app.run_test(size=(80, 24)):
+            end = time.monotonic() + PATIENCE
+            while app.is_running and time.monotonic() < end:
+                await asyncio.sleep(0.02)
+            assert time.monotonic() < end
+        assert not source._thread.is_alive()
+
+    asyncio.run(drive())
+
+
 def test_before_the_first_estimate_and_after_the_last(flight: Flight) -> None:
     async def drive() -> None:
         source = Fed()
