@@ -270,6 +270,10 @@ def _protection(name: str, table: Any) -> Protection:
         raise LeverError(f"{where}: it has neither a profile nor a counter")
     if protection.profile not in (None, 1, 2, 5):
         raise LeverError(f"{where}: profile = {protection.profile}; it may be 1, 2 or 5")
-    if (protection.profile == 2) != (isinstance(protection.data_id, tuple) and len(protection.data_id) == 16):
-        raise LeverError(f"{where}: data_id is a list of sixteen bytes for profile 2, and a number for the others")
+    most, count = (255, 16) if protection.profile == 2 else (65535, 1)
+    each = ids if isinstance(ids, tuple) else (ids,)
+    if isinstance(ids, tuple) != (count > 1) or len(each) != count or not all(0 <= one <= most for one in each):
+        raise LeverError(
+            f"{where}: data_id is a list of sixteen bytes for profile 2, and a number from 0 to 65535 for the others"
+        )
     return protection
