@@ -109,6 +109,11 @@ class AircraftResponse:
         """Return the gain margin below which there is an alarm [dB]."""
         return round(float(self.pointer.alarm), 6)
 
+    def seat_modes(self) -> list[tuple[float, ...]]:
+        """Return by_rate, by_place, damping and stiffness of each mode between accelerometer and seat."""
+        modes = (self.pointer.seat[i] for i in range(self.pointer.seat_modes))
+        return [tuple(float(getattr(mode, name)) for name in _MODE) for mode in modes]
+
     def text(self) -> str:
         """Return the content of its file."""
         at = self.pointer
@@ -125,8 +130,7 @@ class AircraftResponse:
             lines += [
                 "# and by_rate [1/s], by_place [1/s²], damping [1/s] and stiffness [1/s²] of each mode between them"
             ]
-            modes = (at.seat[i] for i in range(at.seat_modes))
-            lines += [f"{_SEAT}  " + "  ".join(f"{getattr(mode, each):.9g}" for each in _MODE) for mode in modes]
+            lines += [f"{_SEAT}  " + "  ".join(f"{each:.9g}" for each in mode) for mode in self.seat_modes()]
         return "\n".join(lines) + "\n"
 
 

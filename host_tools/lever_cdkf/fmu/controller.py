@@ -85,5 +85,8 @@ def _config(config: Config, aircraft: AircraftResponse | None, has_bus: bool) ->
         columns = [list(getattr(at, name))[: at.count] for name in ("frequency", "real", "imaginary")]
         numbers = [at.gain_sigma, at.phase_sigma, at.warning, at.alarm]
         values = [*map(float_list, columns), *(f"{float(number)!r}f" for number in numbers)]
+        if at.seat_modes:
+            modes = [float_list(mode) for mode in aircraft.seat_modes()]
+            values += [f"{at.seat_modes}u", f"{float(at.seat_direct)!r}f", f"{{{', '.join(modes)}}}"]
         lines.append(f"#define CONTROLLER_AIRCRAFT {{{at.count}u, {', '.join(values)}}}")
     return "\n".join(lines) + "\n"
