@@ -300,7 +300,8 @@ def test_differences_by_hand() -> None:
 @pytest.fixture(scope="module")
 def minute() -> tuple[Kept, Any]:
     """Return what is kept of a minute at 100 Hz, in pieces."""
-    rng, time = np.random.default_rng(5), np.arange(6000) * 0.01
+    rng = np.random.default_rng(5)
+    time = 0.01 * np.arange(6000, dtype=np.float64)
     names = ("theta_estimate_rad", "z_ddot_measured_m_s2", "tau_m_measured_N_m", "theta_measured_rad", "nis")
     trace: dict[str, FloatArray] = {"time_s": time, **{name: rng.standard_normal(6000) ** 2 for name in names}}
     trace["theta_dot_measured_rad_s"] = np.where(time < 30.0, 0.0, np.nan)  # one output only, later
