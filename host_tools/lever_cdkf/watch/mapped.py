@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ..can.bulk import Buses, Feeder, Frames
@@ -25,6 +25,8 @@ class MappedLog:
         self._traffic = MappedFrames([path], reading)
         self._estimator = Estimator(self._traffic.at_its_rate(config))
         self._estimator.watch(aircraft)
+        self.notes = self._traffic.loaded.notes
+        """What was guessed or is odd, a sentence each."""
         self.damaged, self.ends_early = self._traffic.recording.damaged, self._traffic.recording.ends_early
 
     def chunks(self) -> Iterator[Frames]:
@@ -41,7 +43,9 @@ class MappedLogSource(LogSource):
     """A recorded log, or a file of columns."""
 
     def __init__(self, path: str, reading: Reading, config: Config, aircraft: AircraftResponse | None = None) -> None:
-        super().__init__(path, None, MappedLog(path, reading, config, aircraft))
+        log = MappedLog(path, reading, config, aircraft)
+        super().__init__(path, None, log)
+        self.warning = _said(log.notes)
 
 
 class MappedBusSource(BusSource):
@@ -79,8 +83,14 @@ class MappedBusSource(BusSource):
             assert self._online.period is not None  # it is known before the first frame
             self._estimator = Estimator(at_period(self._config, self._online.period))
             self._estimator.watch(self._aircraft)
+            self.warning = _said(self._online.notes)
         self._put((identifier, data))
         if self._estimator.on_frame(identifier, data) == FRAME_SAMPLE:
             self._estimator.step()
         while (answer := self._estimator.next_frame()) is not None:
             self._put(answer)
+
+
+def _said(notes: Sequence[str]) -> str | None:
+    """Return what was guessed in one sentence, for the user to check; None without a guess."""
+    return f"{'; '.join(notes)}." if notes else None

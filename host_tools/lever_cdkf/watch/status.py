@@ -23,7 +23,7 @@ def of_source(picture: Picture, source: Source) -> tuple[str, str]:
     if source.error is not None:
         return "bad", source.error
     if source.ended:
-        return "watch", source.warning or "the end: nothing more will come"
+        return "watch", f"the end: {source.warning or 'nothing more will come'}"
     return condition(picture)
 
 

@@ -52,7 +52,11 @@ def shown_frequency(text: str) -> float:
 def test_a_log_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED]
     assert main(["monitor", "--once", str(folder / "flight.blf"), *arguments]) == 0
-    assert shown_frequency(capsys.readouterr().out) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+    said = capsys.readouterr()
+    assert shown_frequency(said.out) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
+    assert said.err == (
+        "lever: warning: z_ddot = AhrsAccel.AccVert: gravity is in it, and is subtracted (gravity=included).\n"
+    )
 
 
 def test_the_margin_of_an_aircraft(folder: Path, capsys: pytest.CaptureFixture[str], refused: Refused) -> None:
@@ -100,6 +104,8 @@ def test_a_view_of_a_bus(folder: Path, frames: list[can.Message]) -> None:
         finally:
             source.stop()
     assert source.error is None
+    assert source.warning == f"{'; '.join(online.notes)}."  # what was guessed, for whoever has watched
+    assert "gravity is in it" in source.warning
 
 
 def test_a_recording_says_what_has_come_of_the_mapped_signals(

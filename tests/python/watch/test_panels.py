@@ -101,6 +101,8 @@ def test_the_end_and_an_error_are_said_instead_of_the_state() -> None:
     assert panels.condition(picture, source).plain == "● no frame has come yet"
     source.ended = True
     assert panels.condition(picture, source).plain == "● the end: nothing more will come"
+    source.warning = "The log is incomplete: x."
+    assert panels.condition(picture, source).plain == "● the end: The log is incomplete: x."
     source.error = "Network is down"
     assert panels.condition(picture, source).plain == "● Network is down"
 
