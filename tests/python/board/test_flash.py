@@ -169,6 +169,24 @@ def test_dry_run_runs_nothing(image: Path, stand_in: Path, capsys: pytest.Captur
     assert not called.exists()
 
 
+def test_the_image_of_the_build_is_taken_unless_another_is_named(
+    tmp_path: Path, stand_in: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install(stand_in, "openocd", "", 0)
+    monkeypatch.chdir(tmp_path)
+    built = Path("build/stm32f4/lever_stm32f4_can.elf")
+    built.parent.mkdir(parents=True)
+    built.write_bytes(elf([(FLASH, WHOLE)]))
+    assert main(["flash", "--dry-run"]) == 0
+    first, command = capsys.readouterr().out.splitlines()
+    assert first == f"{built}: {len(WHOLE)} bytes of flash, whole"
+    assert command.endswith(
+        f"-f target/stm32f4x.cfg -c 'program {{{built}}} verify reset exit'"
+    )  # an ELF has its address
+    assert main(["flash"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == f"{built} is in flash, verified and started"
+
+
 @pytest.mark.parametrize("probe", ["usb", "stlink:a b", "stlink:x;shutdown"])
 def test_probe_is_checked(probe: str, image: Path, refused: Refused) -> None:
     assert f"--probe {probe}" in refused("flash", image, "--probe", probe)
