@@ -18,8 +18,11 @@ from lever_cdkf import Config, Result, estimate, run_samples
 from lever_cdkf.errors import LeverError
 from lever_cdkf.report.printed import values
 from lever_cdkf.signals import result_plot
+from lever_cdkf.signals.arrays import signals_by_input
+from lever_cdkf.signals.units import split_name
 from PIL import Image
 from pyarrow import parquet
+from python.report.reading import Reader
 from python.signals.flight import GRAVITY, NATURAL_FREQUENCY, Flight, fly
 
 Columns = dict[str, Any]
@@ -260,3 +263,97 @@ def test_a_plot_that_cannot_be_kept_is_an_error(result: Result, tmp_path: Path) 
     with pytest.raises(LeverError, match="cannot write"):
         result.plot(tmp_path / "nowhere/estimates.pdf")
     assert list(tmp_path.iterdir()) == []
+
+
+# --- what a result shows ---------------------------------------------------------------------------------------------
+
+
+def test_a_result_shows_each_quantity_with_its_sigma_and_unit(result: Result) -> None:
+    shown = [name for name in result if not name.startswith("theta")]
+    lines = repr(result).splitlines()
+    assert lines[0] == f"lever, dual: 20000 samples in 40 s, run at the end, flags: {result.flags[-1]}"
+    assert len(lines) == 1 + len(shown)
+    for line, name in zip(lines[1:], shown, strict=True):
+        each = result[name]
+        unit = "" if name == "damping_ratio" else f" {each.unit}"
+        assert line == f"  {name} = {each.values[-1]:.4g} ± {each.sigma[-1]:.2g}{unit}"
+    page = Reader(result._repr_html_())
+    assert page.text[0] == lines[0]
+    (table,) = page.tables
+    assert table == [
+        ["quantity", "at the end", "σ", "unit"],
+        *(
+            [name, f"{result[name].last:.4g}", f"± {result[name].last_sigma:.2g}", result[name].unit.removeprefix("1")]
+            for name in shown
+        ),
+    ]
+    assert result._repr_html_().count("<li>") == len(result.notes)
+    np.testing.assert_array_equal(np.asarray(result["m_p"]), result["m_p"].values)
+    assert np.asarray(result["m_p"], dtype=np.float32).dtype == np.float32
+
+
+def test_columns_of_a_result_have_their_units(result: Result) -> None:
+    columns = result.columns()
+    quantities = [name for each in result for name in (each, f"{each}_sigma")]
+    assert list(columns) == ["time", *quantities, "nis", "mode", "flags"]
+    units = {name: unit for name, (_, unit) in columns.items()}
+    assert (units["time"], units["nis"], units["mode"], units["flags"]) == ("s", "1", "", "")
+    assert [units[name] for name in ("theta", "theta_dot_sigma", "damping_ratio")] == ["rad", "rad/s", "1"]
+    assert result.time[0] == 0.0
+    assert result.time[-1] == pytest.approx(39.998)
+    aligning = np.isin(result.mode, ("init", "align"))
+    assert aligning[0]
+    assert np.isnan(columns["theta"][0][aligning]).all()
+    assert np.isfinite(columns["theta"][0][~aligning]).all()
+    assert set(result.mode) <= {"init", "align", "run", "coast"}
+
+
+def test_axes_and_table_of_the_plot(result: Result) -> None:
+    shown = [replace(result["natural_frequency"], values=np.linspace(2.0, 3.0, 1001), sigma=np.full(1001, 0.1))]
+    shown.append(replace(result["damping_ratio"], values=np.full(1001, 0.01), sigma=np.full(1001, 0.1)))
+    shown.append(replace(result["m_p"], values=np.full(1001, np.nan), sigma=np.full(1001, np.nan)))
+    time = np.linspace(0.0, 5.0, 1001)
+    figure = result_plot.figure(time, shown)
+    layout = figure.spec()["layout"]
+    assert layout["xaxis"]["title"]["text"] == "time [s]"
+    assert layout["xaxis"]["range"] == [0.0, 5.0]
+    assert layout["yaxis"]["range"] == pytest.approx([2.01 - 0.49, 2.99 + 0.49])  # half of what 98 % of it spans
+    assert layout["yaxis2"]["range"] == pytest.approx([0.0, 0.41])  # four sigma, but nothing below what can be
+    assert "range" not in layout["yaxis3"]
+    assert [trace["name"] for trace in figure.traces if trace["line"]["width"]] == ["estimate"] * 3
+    lines = result_plot.table(time, shown).splitlines()
+    assert lines[0] == (
+        "time [s],natural_frequency [Hz],natural_frequency_sigma [Hz],damping_ratio [1],damping_ratio_sigma [1],"
+        "m_p [kg],m_p_sigma [kg]"
+    )
+    assert lines[1] == "0,2,0.1,0.01,0.1,,"
+    assert len(lines) == 1002
+
+
+@pytest.mark.parametrize(
+    ("name", "key"),
+    [("theta_deg", "theta"), ("theta [deg]", "theta"), ("theta", "theta"), ("theta_dot_deg_s", "theta_dot"),
+     ("z_ddot_m_s2", "z_ddot"), ("tau_m (N m)", "tau_m"), ("grip_force_N", "grip_force"), ("z_ddot_g", "z_ddot")],
+)  # fmt: skip
+def test_a_column_may_have_its_unit_in_its_name(name: str, key: str) -> None:
+    columns = {"time": (np.arange(3.0) * 1e-3, ""), name: (np.arange(3.0), split_name(name)[1])}
+    found = signals_by_input(columns, {})
+    assert list(found) == [key]
+    assert found[key].name == name
+    assert found[key].unit.replace("N m", "Nm") == split_name(name)[1].replace("N m", "Nm")
+    assert signals_by_input(columns, {key: "other"})[key].unit == "other"
+
+
+@pytest.mark.parametrize("name", ["theta_max", "my_theta", "thetas_deg", "theta_dot_max"])
+def test_other_columns_are_no_inputs(name: str) -> None:
+    assert signals_by_input({"time": (np.arange(3.0) * 1e-3, ""), name: (np.arange(3.0), "")}, {}) == {}
+
+
+def test_columns_that_are_no_numbers() -> None:
+    columns = {"time": (np.arange(3.0) * 1e-3, ""), "theta": (np.array(["a", "b", "c"]), "")}
+    with pytest.raises(LeverError, match=r"^theta is no column of numbers$"):
+        signals_by_input(columns, {})
+    with pytest.raises(
+        LeverError, match=r"^time goes on by 2 s a sample, in s: units=\{'time': …\} says what it is in"
+    ):
+        signals_by_input({"time": (np.arange(3.0) * 2.0, "s")}, {})
