@@ -7,6 +7,8 @@ import json
 import re
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ from lever_cdkf.firmware.config import CHOICES, Config, settings_table
 from lever_cdkf.firmware.library import enum_names
 from lever_cdkf.text.counts import counted, in_percent
 from lever_cdkf.text.suggestions import did_you_mean, nearest_names
+from lever_cdkf.tune.calibration import Calibrated
 from python.conftest import Run
 
 
@@ -84,6 +87,43 @@ def test_the_command_that_tunes_another_part_keeps_all_options() -> None:
         "--map", "theta=a", "--settings", "out.settings",
     ]  # fmt: skip
     assert "--map new.toml --settings" in tune._replay(args, Path("new.toml"))
+
+
+@pytest.mark.parametrize(
+    ("keep", "changes", "calm", "words"),
+    [
+        (["theta_noise", "m_p_walk"], [], 60.0, "try without --keep theta_noise, since noise that is set wrong looks"),
+        (["m_p_walk"], [(20.0, 21.0)], 40.6, "try the 39 s from 27 s on, the longest part in which the arm does not"),
+        ([], [(20.0, 21.0)], 10.0, "try a part in which the pilot holds still and smooth air shakes the lever"),
+        ([], [], 60.0, "try a part in which the pilot holds still and smooth air shakes the lever"),
+    ],
+)
+def test_what_to_try_where_the_calibration_is_not_believed(
+    keep: list[str], changes: list[tuple[float, float]], calm: float, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    args = argparse.Namespace(
+        log=["a.log"], dbc=None, channel=None, clock=None, id_offset=None, id_base=None, map=[], settings=None,
+        output=Path("out.settings"), page=None, set=[], keep=keep, json=None, start=3.0,
+    )  # fmt: skip
+    health = SimpleNamespace(lost=3, corrupt=0, late=2)
+    tuned_on = np.arange(50_000) < 35_000
+    likelihood = SimpleNamespace(
+        recording=SimpleNamespace(bus="can0", period=1e-3, health=health), tuned_on=tuned_on, judged_by=~tuned_on,
+        runs=7, changes=changes, longest_calm=lambda: (24.0, calm),
+    )  # fmt: skip
+    entry = Calibrated("z_ddot_gain", 1.0, 0.02, 1.03, 0.005, white=False)
+    calibration: Any = SimpleNamespace(entries=[entry], text="It stays.")
+    assert tune._refuse(args, cast(Any, likelihood), calibration) == 1
+    said = capsys.readouterr()
+    assert words in said.err
+    assert said.err.startswith("lever: tune: no settings are written, since the calibration is not believed: try ")
+    row = next(line.split() for line in said.out.splitlines() if line.startswith("z_ddot_gain"))
+    assert row[:9] == ["z_ddot_gain", "1", "1", "0.02", "1", "0.02", "1.03", "0.005", "kept:"]
+    assert (
+        "a.log, can0: tuned on 35 s, judged by the 15 s after it (3 lost, 2 late); 7 runs of the filter. It stays."
+    ) in said.out
+    next_command = "Next:\nlever tune a.log --start 27 --length 39 -o out.settings --keep m_p_walk\n"
+    assert (next_command in said.out) is bool(changes and calm > 20.0)
 
 
 @pytest.mark.parametrize("terminal", [True, False])
