@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import importlib.metadata
 import signal
 import subprocess
@@ -14,6 +15,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from lever_cdkf.cli import entry_point
 from lever_cdkf.cli.main import main
 from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
@@ -165,3 +167,21 @@ def test_worker_processes_leave_it_to_their_parent_from_the_start() -> None:
     with interrupts.worker_pool(2) as pool:
         assert signal.pthread_sigmask(signal.SIG_BLOCK, ()) == mask
         assert signal.SIGINT in pool.apply(signal.pthread_sigmask, (signal.SIG_BLOCK, ()))
+
+
+def test_ctrl_c_while_the_command_itself_is_imported(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Interrupted:
+        """A finder at whose import Ctrl-C comes."""
+
+        def find_spec(self, name: str, *_: object) -> None:
+            if name == "lever_cdkf.runtime.exit_status":
+                raise KeyboardInterrupt
+
+    monkeypatch.delitem(sys.modules, "lever_cdkf.runtime.exit_status")
+    monkeypatch.setattr(sys, "meta_path", [Interrupted(), *sys.meta_path])
+    with pytest.raises(SystemExit) as ended:
+        importlib.reload(entry_point)
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "lever: interrupted\n"
