@@ -19,14 +19,7 @@ LATE = 10.0
 """[s] by which frames may be recorded out of order: so long after the end of a part it is complete."""
 
 _KEPT_BEFORE_SAMPLES = 1000  # commands that a recording may have long before its first sample
-_WORDS = {
-    "other_buses": "of other buses",
-    "other_identifiers": "of other messages",
-    "extended": "with 29-bit identifiers",
-    "remote": "remote requests",
-    "error": "error frames",
-    "fd": "CAN FD",
-}
+_OTHERS = ("other_buses", "other_identifiers", "extended", "remote", "error", "fd")
 
 
 def why_refused(corrupt: int, late: int) -> str:
@@ -59,7 +52,7 @@ class EstimatorFrames:
         """Name of the bus, once it is known."""
         self.frames = 0
         """All frames in the part."""
-        self.others = dict.fromkeys(_WORDS, 0)
+        self.others = dict.fromkeys(_OTHERS, 0)
         """Frames that are neither for nor from the estimator, by kind."""
         self.corrupt_answers = 0
         """Recorded answers of an estimator whose CRC or length is wrong; left out."""
@@ -103,16 +96,6 @@ class EstimatorFrames:
                 self._count_others(frames, np.zeros(len(frames), np.bool_))
         if self._bus is None:
             raise LogError(self._why_no_samples())
-
-    def described(self) -> list[str]:
-        """Return what was left out, in words.
-
-        Returns
-        -------
-        list of str
-            An entry for each kind of frame that occurred.
-        """
-        return [f"{count:,} {_WORDS[kind]}" for kind, count in self.others.items() if count]
 
     def _part(self) -> Iterator[Frames]:
         """Yield the frames of the part, counted, and commands before it."""

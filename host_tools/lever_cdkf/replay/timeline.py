@@ -52,10 +52,8 @@ class Timeline:
         self._last: tuple[int, int] | None = None  # recorded and sample time of the last one [us]
 
     def seconds(self, recorded_us: IntArray, sample_us: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return times [s] of samples with these recorded times and these 32-bit times of the sender."""
+        """Return times [s] of one or more samples with these recorded times and these 32-bit times of the sender."""
         sender = sample_us.astype(np.int64)
-        if not len(sender):
-            return np.zeros(0)
         recorded_0, sender_0 = self._last or (int(recorded_us[0]), int(sender[0]))
         steps = self._steps(np.diff(recorded_us, prepend=recorded_0), np.diff(sender, prepend=sender_0))
         if self._last is None:

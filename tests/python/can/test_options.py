@@ -236,7 +236,7 @@ def test_why_frames_are_refused_in_words() -> None:
     assert why_refused(1, 5678) == f"1 corrupt (CRC, length or value), {late}"
 
 
-def test_each_kind_of_other_frame_is_counted_and_said(session: Session, tmp_path: Path) -> None:
+def test_each_kind_of_other_frame_is_counted(session: Session, tmp_path: Path) -> None:
     log = tmp_path / "mixed.log"
     others = [
         *["(0.0) can7 700#01"] * 2, *["(0.0) lever 700#01"] * 3, *["(0.0) lever 18FEF100#01"] * 4,
@@ -251,9 +251,6 @@ def test_each_kind_of_other_frame_is_counted_and_said(session: Session, tmp_path
         "other_buses": 2, "other_identifiers": 3, "extended": 4, "remote": 5, "error": 6, "fd": fd,
     }  # fmt: skip
     assert fd + traffic.recording.damaged == 7
-    assert [line for line in traffic.described() if "FD" not in line] == [
-        "2 of other buses", "3 of other messages", "4 with 29-bit identifiers", "5 remote requests", "6 error frames",
-    ]  # fmt: skip
 
 
 def test_two_buses_with_samples_are_to_be_chosen_of(session: Session, tmp_path: Path) -> None:
