@@ -23,14 +23,6 @@ class Detrend:
         """The slow level, in the unit of the signal."""
         return sum(self._levels)
 
-    def rate(self, deviation: float, corner: float) -> float:
-        """Return the rate of the level, where its last section leaves this deviation; corner [Hz]."""
-        rate, seen = 0.0, deviation
-        for level, slope, damping in zip(self._levels[::-1], self._slopes[::-1], DAMPING[::-1], strict=True):
-            rate += slope + damping * 2.0 * math.pi * corner * seen
-            seen += level
-        return rate
-
     def hold(self) -> None:
         """Hold the level where it is until the next value."""
         self._slopes = [0.0] * len(DAMPING)
