@@ -220,6 +220,7 @@ def test_everything_has_its_name(result: Result, tmp_path: Path) -> None:
 
 def test_the_plot_shows_the_last_estimates(result: Result) -> None:
     figure = result.plot()
+    assert figure.get_size_inches() == pytest.approx([180.0 / 25.4, 0.5 + 1.2 * 5])
     labels = [axis.get_ylabel() for axis in figure.axes]
     assert labels == [
         *("$m_{p}$\n[kg]", "$c_{p}$\n[N s/m]", "$k_{p}$\n[N/m]"),

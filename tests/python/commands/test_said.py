@@ -161,3 +161,8 @@ def test_help_begins_with_the_usage_and_has_examples(command: str, lever: Run) -
     assert status == 0
     assert out.startswith(f"usage: lever {command}")
     assert re.search(rf"^examples?:\n(?: .*\n)*  lever {command}", out, re.MULTILINE)
+
+
+def test_a_minute_of_a_log_is_looked_at_unless_told_otherwise(lever: Run) -> None:
+    assert "seconds used (default: 60)" in " ".join(lever("map", "--help")[1].split())
+    assert "seconds used (default: all)" in " ".join(lever("replay", "--help")[1].split())

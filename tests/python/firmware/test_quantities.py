@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from lever_cdkf.errors import SettingsError
+from lever_cdkf.errors import LeverError, SettingsError
+from lever_cdkf.firmware.aircraft import AircraftResponse, SeatTransfer
 from lever_cdkf.firmware.config import model_parameters, setting, settings_table, shortest, single
 from lever_cdkf.firmware.library import enum_names, enum_words, ffi, struct_dtype
 from lever_cdkf.firmware.quantities import DYNAMICS, parameters, quantities, recorded_name
@@ -97,3 +98,17 @@ def test_names_of_enums_have_no_prefix(enum: str) -> None:
     assert not any("lever" in name or name == "count" or name != name.lower() for name in names.values())
     assert set(enum_words(enum)) <= set(names.values())
     assert all(words == " ".join(words.split()) for words in enum_words(enum).values())
+
+
+def test_limits_of_the_margin_where_nothing_else_is_said() -> None:
+    flown = AircraftResponse([1.0, 2.0, 3.0], [1.0 + 0j, 1j, 0.5 + 0j], gain_sigma=0.1, phase_sigma=0.1)
+    assert (flown.warning, flown.alarm, flown.name) == (5.0, 4.0, "an aircraft")
+    assert flown.seat_modes() == []
+    for count in (2, 25):
+        with pytest.raises(
+            LeverError, match=r"^the response of an aircraft has 3 to 24 frequencies, and a value at each$"
+        ):
+            AircraftResponse(range(count), [1j] * count, gain_sigma=0.1, phase_sigma=0.1)
+    seat = SeatTransfer(1.0, [(0.0, 0.0, 1.0, 1.0)] * 4)
+    with pytest.raises(LeverError, match="between accelerometer and seat there are 1 to 3 modes"):
+        AircraftResponse([1.0, 2.0, 3.0], [1j] * 3, gain_sigma=0.1, phase_sigma=0.1, seat=seat)

@@ -19,11 +19,13 @@ from lever_cdkf.replay.comparison import Comparison
 from lever_cdkf.replay.engine import Options, replay
 from lever_cdkf.replay.recorded_run import Kept, RecordedRun
 from lever_cdkf.replay.summary import failure, verdict, warning
+from lever_cdkf.replay.timeline import Clocks
 from lever_cdkf.report import summary_html
 from lever_cdkf.report.bode import slow_trim
 from lever_cdkf.report.run import Run
 from lever_cdkf.results import summary as summaries
 from lever_cdkf.results.summary import Difference, Mapped, MessageCounts, ReplaySummary, Snapshots, Stability
+from lever_cdkf.signals.reading import Reading, Table
 from python.conftest import Run as Command
 from python.conftest import Session
 from python.report.reading import Reader
@@ -441,3 +443,13 @@ def test_whole_numbers_may_stand_for_others(summary: ReplaySummary) -> None:
     content = asdict(summary) | {"flagged_share": 1, "modes_s": {"run": 5}}
     read = summaries.of(ReplaySummary, content)
     assert (read.flagged_share, read.modes_s) == (1, {"run": 5})
+
+
+def test_counts_begin_at_nothing() -> None:
+    assert set(asdict(MessageCounts()).values()) == {0}
+    assert set(asdict(Difference("kg")).values()) == {"kg", 0, None}
+    assert set(asdict(Snapshots()).values()) == {0, None}
+    assert set(asdict(Clocks()).values()) == {0}
+    assert (Reading().start, Reading().length, Reading().is_of_lever_dbc) == (0.0, math.inf, False)
+    table = Table(["a"])
+    assert (table.damaged, table.ends_early, table.done, table.size) == (0, [], 1, 1)

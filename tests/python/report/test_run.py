@@ -15,6 +15,7 @@ from lever_cdkf.firmware.quantities import parameters
 from lever_cdkf.models.transfer import Transfer
 from lever_cdkf.numeric.arrays import ComplexArray
 from lever_cdkf.report import bode
+from lever_cdkf.report.charts import health
 from lever_cdkf.report.run import Run, nis_averages
 from lever_cdkf.report.series import coarse, envelope, jumps, packed, spread_indices, welch
 from lever_cdkf.results.faults import FaultCounts, warning_bits
@@ -256,3 +257,25 @@ def test_what_to_do_about_each_fault(cause: str, step: str) -> None:
         assert said.endswith("(30 % of the time).")
         assert warning({cause: 0.6}, 0.6).startswith("Do not trust the estimates: ")
         assert warning({cause: 0.3}, 0.02) == warning({cause: 0.3}, None) == ""
+
+
+@pytest.mark.parametrize(("share", "said"), [(0.019, False), (0.021, True)])
+def test_two_per_cent_of_the_time_are_a_passing_fault(share: float, said: bool) -> None:
+    assert bool(warning({"base": 0.3}, share)) is said
+    assert bool(warning({"base": share}, 0.3)) is said
+    assert bool(next_step({"base": share})) is said
+
+
+@pytest.mark.parametrize(("share", "whole"), [(0.49, False), (0.51, True)])
+def test_half_of_the_time_with_a_warning_is_the_run_as_a_whole(share: float, whole: bool) -> None:
+    assert warning({"base": share}, share).startswith("Do not trust the estimates: ") is whole
+
+
+def test_a_short_fault_is_drawn_long_enough_to_be_seen() -> None:
+    """As long as two thousandths of the time."""
+    faults = np.where(np.arange(len(TIME)) == 1000, float(BITS["gap"]), 0.0)
+    figure = health.timeline(run(mode=2.0, faults=faults))
+    assert figure is not None
+    (bar,) = (trace for trace in figure.traces if trace["name"] == "fault: gap")
+    assert bar["x"][1] - bar["x"][0] == pytest.approx(0.002 * TIME[-1], abs=1e-4)
+    assert bar["x"][0] == pytest.approx(5.0, abs=0.01)

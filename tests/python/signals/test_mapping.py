@@ -389,3 +389,16 @@ def test_how_a_log_is_read(tmp_path: Path) -> None:
         options.chosen_reading(parsed("--clock", "theta"), "x.log")
     table = options.chosen_reading(parsed(), str(tmp_path / "x.parquet"))
     assert (table.is_of_lever_dbc, table.mapping) == (False, None)
+
+
+@pytest.mark.parametrize(("back", "note"), [(0.9, False), (1.2, True)])
+def test_a_clock_of_a_table_is_set_back_by_more_than_a_second(back: float, note: bool, tmp_path: Path) -> None:
+    times = [*np.arange(0.0, 3.0, 0.01), *(np.arange(3.0, 6.0, 0.01) - back)]
+    (tmp_path / "a.csv").write_text("t [s],a\n" + "".join(f"{at:.2f},{k % 7}\n" for k, at in enumerate(times)))
+    (found,) = read_table(str(tmp_path / "a.csv"))
+    assert bool(found.notes) is note
+
+
+@pytest.mark.parametrize(("size", "unit"), [(0.69, "g"), (0.72, "m/s^2")])
+def test_the_likely_unit_changes_at_what_a_cabin_shakes(size: float, unit: str) -> None:
+    assert likely("z_ddot", size * np.where(np.arange(1000) % 2, 1.0, -1.0))[0] == unit

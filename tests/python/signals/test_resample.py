@@ -99,3 +99,38 @@ def test_rates_that_the_firmware_does_not_take(rate: float, said: str) -> None:
 def test_signals_that_are_not_of_one_time() -> None:
     with pytest.raises(LeverError, match="no value of it is at the time of"):
         sample({"theta": signal(clock(500.0)), "z_ddot": signal(clock(500.0, 1000.0))})
+
+
+@pytest.mark.parametrize(
+    ("offset", "spread", "how"),
+    [
+        (0.34, 0.0, "paired"),
+        (0.36, 0.0, "interpolated"),
+        (-0.34, 0.0, "paired"),
+        (0.2, 0.09, "paired"),
+        (0.2, 0.13, "interpolated"),
+    ],
+)
+def test_a_pair_is_a_third_of_a_period_apart_at_most_and_steady(offset: float, spread: float, how: str) -> None:
+    time = clock(500.0)
+    jitter = spread * (np.arange(len(time)) % 2)
+    sampled = sample({"theta": signal(time), "z_ddot": Signal("z", time + 2e-3 * (offset + jitter), wave(time))})
+    assert sampled.how["z_ddot"] == how
+
+
+@pytest.mark.parametrize(("rate", "how"), [(500.0 / 1.4, "interpolated"), (500.0 / 1.6, "slower")])
+def test_what_is_slower_by_half_is_missing_in_between(rate: float, how: str) -> None:
+    assert sample({"theta": signal(clock(rate)), "z_ddot": signal(clock(500.0))}, "z_ddot").how["theta"] == how
+
+
+@pytest.mark.parametrize(("lost", "missing"), [(1, 0), (2, 2)])
+def test_nothing_is_interpolated_over_more_than_two_and_a_half_periods(lost: int, missing: int) -> None:
+    time = clock(500.0, 0.0009)
+    sampled = sample({"theta": signal(clock(500.0)), "z_ddot": signal(np.delete(time, range(700, 700 + lost)))})
+    inside = np.isnan(sampled.columns["z_ddot"])[600:800].sum()
+    assert inside == (0 if not missing else lost + 1)
+
+
+@pytest.mark.parametrize(("rate", "clock_of"), [(1000.0 / 1.3, "theta"), (1000.0 / 1.36, "z_ddot")])
+def test_a_lever_signal_of_about_the_rate_is_the_clock(rate: float, clock_of: str) -> None:
+    assert sample({"theta": signal(clock(1000.0)), "z_ddot": signal(clock(rate))}).clock == clock_of

@@ -478,6 +478,19 @@ def test_a_command_that_makes_no_sense_is_refused(message: str, text: str) -> No
 
 
 @pytest.mark.requirement("S10")
+@pytest.mark.parametrize(("size", "is_heard"), [(512, True), (513, False)])
+def test_a_message_has_512_bytes_at_most(size: int, is_heard: bool, on_server: Callable[..., FlightSource]) -> None:
+    async def story(server: Server) -> None:
+        connection = await websocket_connect(server.address.replace("http", "ws") + "socket")
+        await connection.write_message('{"request": "run"}'.ljust(size))
+        while (message := await connection.read_message()) is not None and "sent" not in json.loads(message):
+            pass
+        assert (message is not None) is is_heard
+        await closed(connection, is_heard)
+
+    on_server(story)
+
+
 def test_what_is_refused_is_told_and_changes_nothing(on_server: Callable[..., FlightSource]) -> None:
     async def story(server: Server) -> None:
         async with Visitor(server) as visitor:

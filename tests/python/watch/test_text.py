@@ -326,3 +326,23 @@ def test_a_log_that_is_read_at_once_says_what_it_is(tmp_path: Path, lever: Run) 
     log = tmp_path / "short.log"
     log.write_text("(1.000000) can0 123#00\n")
     assert "● frames pass, but neither samples nor estimates" in lever("monitor", "--once", log)[1]
+
+
+@pytest.mark.parametrize(
+    ("failed", "words"),
+    [(1, "program memory"), (2, "RAM"), (4, "stack"), (8, "golden vector"), (16, "settings or aircraft of its build")],
+)
+def test_each_self_test_has_its_words(failed: int, words: str) -> None:
+    bus = Bus()
+    bus.say(0.1, PLATFORM_RESET={"cause": "power_on", "failed": failed})
+    assert status.last_reset(bus.picture) == f"power on, 0 since power-on; failed: {words}"
+
+
+@pytest.mark.parametrize(("age", "is_shown"), [(1.99, True), (2.01, False)])
+def test_what_is_older_than_two_seconds_is_not_shown(age: float, is_shown: bool) -> None:
+    bus = Bus()
+    bus.say(1.0, STATE_ESTIMATE=STATE, HEALTH=HEALTH, STABILITY={"valid": 1, "bounce": "clear"})
+    bus.picture.take([], 1.0 + age)
+    assert (facts(bus)["mode"][0] == "run") is is_shown
+    assert (status.bounce(bus.picture) is not None) is is_shown
+    assert (not math.isnan(bus.picture.nis())) is is_shown
