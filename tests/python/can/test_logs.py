@@ -254,3 +254,50 @@ def test_foreign_frames_without_end_take_no_memory(session: Session, tmp_path: P
     assert others == 2 * times * 20000
     assert frames == ours + others
     assert megabytes < STREAM_MB
+
+
+# --- lines without end ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("length", [bulk.LONGEST_LINE, bulk.LONGEST_LINE + 1, 5 * bulk.LONGEST_LINE])
+def test_a_line_that_is_too_long_is_one_line(length: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the blocks are, and all after it is read."""
+    log = tmp_path / "long.log"
+    log.write_text("(1.0) can0 123#00\n" + "x" * length + "\n(2.0) can0 124#00\n")
+    for block in (bulk.LONGEST_LINE // 2, bulk.LONGEST_LINE, 1 << 20):
+        monkeypatch.setattr(logs, "BLOCK", block)
+        recording = Recording([log])
+        assert [frame["id"] for chunk in recording.chunks() for frame in chunk] == [0x123, 0x124]
+        assert (recording.damaged, recording.ends_early) == (1, [])
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("once\nupon\n", "holds no CAN frame; 2 lines of it are something else: is it a log of candump -L?"),
+        ("", "holds no CAN frame"),
+    ],
+)
+def test_a_log_without_a_frame_says_what_it_holds(content: str, said: str, tmp_path: Path) -> None:
+    log = tmp_path / "none.log"
+    log.write_text(content)
+    with pytest.raises(logs.LogError) as error:
+        Recording([log])
+    assert str(error.value) == f"{log}: {said}"
+
+
+def test_bytes_that_are_done_are_counted(session: Session, tmp_path: Path) -> None:
+    packed = tmp_path / "b.log.gz"
+    packed.write_bytes(gzip.compress(b"(1.0) can0 123#00\n" * 100))
+    for paths in ([session.log], [packed], [session.log, packed]):
+        recording = Recording(paths)
+        size = sum(path.stat().st_size for path in paths)
+        assert recording.size == size
+        assert 0 < recording.done <= size
+        assert sum(map(len, recording.chunks())) > 0
+        assert recording.done == size
+
+
+def test_what_is_said_of_logs_that_are_cut_off() -> None:
+    assert logs.incomplete([]) == ""
+    assert logs.incomplete(["a: x", "b: y"]) == "The log is incomplete: a: x; b: y."
