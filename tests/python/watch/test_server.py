@@ -554,6 +554,12 @@ def test_a_port_in_use_is_one_line(refused: Refused) -> None:
     [
         (["--scenario", "steady", "--host", "203.0.113.1"], "cannot listen at 203.0.113.1 port 8642: "),
         (["--scenario", "steady", "--port", "x"], "'x' is not a port from 0 to 65535"),
+        (["--scenario", "steady", "--port", "65536"], "'65536' is not a port from 0 to 65535"),
+        (["--scenario", "steady", "--port", "-1"], "is not a port from 0 to 65535"),
+        (
+            ["--scenario", "steady", "--host", "203.0.113.1", "--port", "65535"],
+            "cannot listen at 203.0.113.1 port 65535",
+        ),
         (["--scenario", "steady", "--settings", "x"], "--settings goes with a bus or a log"),
         ([], "nothing to watch"),
     ],
