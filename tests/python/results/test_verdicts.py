@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -57,6 +58,45 @@ def test_a_fifth_of_correlation_makes_a_long_residual_coloured(correlation: floa
     assert "white" not in text
     assert ("are coloured" in text) is not white
     assert whiteness.verdict(None) == ""
+
+
+@pytest.mark.parametrize(
+    ("share", "white", "said"),
+    [
+        (0.99, True, "Residuals of the rate are white up to a lag of 0.5 s (chance alone: within ±{band:.2f}). "),
+        (-0.99, True, "Residuals of the rate are white up to a lag of 0.5 s (chance alone: within ±{band:.2f}). "),
+        (
+            1.01,
+            True,
+            "Residuals of the rate are slightly correlated ({largest:.2f} after 140 ms; chance alone: within ",
+        ),
+        (
+            -1.01,
+            True,
+            "Residuals of the rate are slightly correlated ({largest:.2f} after 140 ms; chance alone: within ",
+        ),
+        (
+            2.0,
+            False,
+            "Residuals of the rate are coloured (correlation {largest:.2f} after 140 ms; chance alone: within ",
+        ),
+    ],
+)
+def test_residuals_in_words(share: float, white: bool, said: str) -> None:
+    measured = whiteness.Whiteness(0.02, [0.0] * 25, 0.04, 0.0, 0.14, white)
+    band = measured.band_of_all
+    assert band == pytest.approx(0.04 * stats.norm.ppf(0.5 + 0.5 * 0.95 ** (1 / 25)) / stats.norm.ppf(0.975))
+    largest = share * band
+    text = whiteness.verdict(replace(measured, largest=largest))
+    assert text.startswith(said.format(band=band, largest=largest))
+    assert text.endswith(whiteness.CANNOT_SEE) is white
+    assert ("below the 0.2 from which on the model counts as wrong" in text) is (white and abs(share) > 1.0)
+
+
+@pytest.mark.parametrize(("ratio", "size"), [(0.9, "as large as"), (1.1, "as large as")])
+def test_innovations_in_words(ratio: float, size: str) -> None:
+    said = nis.verdict(Nis(mean=2.0 * ratio, expected=2.0))
+    assert said == f"Innovations are {size} the filter expects (mean NIS {2.0 * ratio:.2f}, expected 2.00)."
 
 
 def test_an_average_needs_half_of_its_values() -> None:
