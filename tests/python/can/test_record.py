@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -107,6 +107,31 @@ def test_losses_and_damage_are_counted(session: Session, tmp_path: Path, capsys:
     assert "1999 frames, 3 lost, 1 corrupt, 1 error frames" in printed
     row = next(line.split() for line in printed.splitlines() if "LEVER_SAMPLE" in line)
     assert [row[index] for index in (4, 5, 6)] == ["3", "0", "1"]
+
+
+def test_each_row_of_a_recording(session: Session, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sent = messages(session, 1000)
+    other = can.Message(arbitration_id=0x700, is_extended_id=False, data=b"\1")
+    Line.frames, Line.end = deque([*sent, other, other]), staticmethod(ctrl_c)
+    file = tmp_path / "rows.json"
+    command = ["record", "--interface", "kvaser", "--channel", "x", "-o", str(tmp_path / "a.log"), "--json", str(file)]
+    assert main(command) == 0
+    said = capsys.readouterr()
+    assert said.err == f"recording a bus in a test into {tmp_path / 'a.log'}; Ctrl-C ends\n"
+    summary = "1002 frames, 0 lost, 0 corrupt, 0 error frames, controller active"
+    assert said.out.endswith(f"{tmp_path / 'a.log'}: {summary}\n")
+    rows = {row["message"]: row for row in json.loads(file.read_text())["recorded"]}
+    counts = Counter(message.arbitration_id for message in sent)
+    assert {row["id"]: row["frames"] for name, row in rows.items() if name != "others"} == {
+        f"{identifier:#05x}": count for identifier, count in counts.items()
+    }
+    assert list(rows)[-1] == "others"
+    for name, row in rows.items():
+        expected = None if name == "others" else 0
+        assert [row[key] for key in ("lost", "repeated", "corrupt")] == [expected] * 3
+    rates = [row["rate [1/s]"] / row["frames"] for row in rows.values()]
+    assert rates == pytest.approx([rates[0]] * len(rates), rel=0.2)  # over the same time
+    assert rows["others"]["frames"] == 2
 
 
 def test_a_log_that_is_there_is_not_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
