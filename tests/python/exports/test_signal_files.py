@@ -149,6 +149,30 @@ def test_mf4_of_a_simulation_has_the_truth_and_no_date(simulation: Path) -> None
         np.testing.assert_allclose(signal.samples, table["m_p_true_kg"], rtol=1e-6)
 
 
+def test_mf4_has_a_group_for_each_rate_and_says_who_made_it(replayed: Replayed, simulation: Path) -> None:
+    groups = []
+    for path in (replayed.folder, simulation):
+        with MDF(path / "signals.mf4") as file:
+            groups.append(
+                {group.channel_group.acq_name: [each.name for each in group.channels] for group in file.groups}
+            )
+            history = ElementTree.fromstring(file.file_history[0].comment)
+            truth = file.get("m_p_true").source if path is simulation else None
+    of_replay, of_simulation = groups
+    assert list(of_replay) == ["samples", "estimates", "recorded estimates"]
+    assert set(of_simulation) == {"samples", "estimates", "truth"}
+    assert {"theta_measured", "theta_recorded", "dither"} <= set(of_replay["samples"])
+    assert {"m_p_estimate", "mode", "lost"} <= set(of_replay["estimates"])
+    assert "m_p_recorded" in of_replay["recorded estimates"]
+    assert all(name.endswith("_true") for name in of_simulation["truth"][1:])
+    assert truth is not None
+    assert (truth.name, truth.path, truth.source_type) == ("truth", "simulation", truth.SOURCE_TOOL)
+    said = {each.tag: each.text for each in history}
+    assert (said["tool_id"], said["tool_vendor"]) == ("lever", "Lever CDKF")
+    assert said["tool_version"]
+    assert said["TX"]
+
+
 # --- MCAP -------------------------------------------------------------------------------------------------------------
 
 
@@ -201,6 +225,25 @@ def test_mcap_is_in_order_of_time_with_words_for_mode_and_faults(replayed: Repla
     health = [contents for _, contents in messages(replayed.folder / "signals.mcap")[0]["/lever/HEALTH"]]
     assert {"align", "run"} <= {contents["mode"] for contents in health}
     assert "settling" in {contents["faults"] for contents in health}
+
+
+def test_mcap_says_what_its_channels_are(replayed: Replayed) -> None:
+    with (replayed.folder / "signals.mcap").open("rb") as stream:
+        reader = make_reader(stream)
+        library = reader.get_header().library
+        summary = reader.get_summary()
+    assert library.startswith("lever-cdkf ")
+    assert summary is not None
+    names = {schema.name: json.loads(schema.data) for schema in summary.schemas.values()}
+    assert {channel.topic for channel in summary.channels.values()} == {f"/{name}" for name in names}
+    for name, schema in names.items():
+        assert name == f"lever/{schema['title']}"
+        message = replayed.dbc.get_message_by_name(schema["title"].removeprefix("recorded/"))
+        assert schema["description"] == (message.comment or "")
+        assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    theta = names["lever/LEVER_SAMPLE"]["properties"]["theta"]
+    assert theta == {"type": "number", "description": "Lever angle from the floor. [rad]"}
+    assert names["lever/HEALTH"]["properties"]["mode"]["type"] == "string"
 
 
 # --- Parquet ----------------------------------------------------------------------------------------------------------
