@@ -153,9 +153,8 @@ def test_mf4_has_a_group_for_each_rate_and_says_who_made_it(replayed: Replayed, 
     groups = []
     for path in (replayed.folder, simulation):
         with MDF(path / "signals.mf4") as file:
-            groups.append(
-                {group.channel_group.acq_name: [each.name for each in group.channels] for group in file.groups}
-            )
+            every: Any = file.groups
+            groups.append({group.channel_group.acq_name: [each.name for each in group.channels] for group in every})
             history = ElementTree.fromstring(file.file_history[0].comment)
             truth = file.get("m_p_true").source if path is simulation else None
     of_replay, of_simulation = groups
