@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -13,8 +14,9 @@ from lever_cdkf.firmware.innovations import INNOVATION, SAMPLE
 from lever_cdkf.tune import search as searching
 from lever_cdkf.tune.calibration import dither
 from lever_cdkf.tune.likelihood import Likelihood, noise_as_set
-from lever_cdkf.tune.recording import Recording
+from lever_cdkf.tune.recording import Recording, read
 from lever_cdkf.tune.search import Search, Tuned, groups, logarithmic_range
+from python.tune.test_commands import write_log
 
 WIDE = 0.5 * 1.959964**2
 """By which the logarithm of a likelihood has fallen at the ends of a 95 % interval."""
@@ -225,3 +227,13 @@ def test_a_delay_of_nothing_changes_nothing() -> None:
     moved = recorded.without_delay(0.1)
     assert moved["z_ddot"][:80] == pytest.approx(recorded.time[:80] + 0.1, abs=1e-6)
     assert recorded.samples["z_ddot"][0] == 0.0
+
+
+def test_two_samples_are_a_recording_and_one_is_none(tmp_path: Path) -> None:
+    write_log(tmp_path / "two.log", 2)
+    two = read([tmp_path / "two.log"])
+    assert (len(two.samples), two.period, two.bus) == (2, 1e-3, "can0")
+    assert two.duration == pytest.approx(1e-3)
+    write_log(tmp_path / "one.log", 1)
+    with pytest.raises(LeverError, match=r"one\.log: too few samples to tune on, 1: it holds no more$"):
+        read([tmp_path / "one.log"])
