@@ -358,7 +358,8 @@ def _from_power_on(row: Row) -> Row:
     """
     requirement, wrong = row.requirement, row.requirement.within == _WRONG
     later = _JUDGED if wrong else _ALIGNED if row.requirement.within == _STUCK else 0
-    flags = (*requirement.flags, "BASE", "MISMATCH", "INNOVATION", "CALIBRATION") if wrong else requirement.flags
+    more = ("BASE", "MISMATCH", "INNOVATION", "CALIBRATION") if wrong else ()
+    flags = tuple(dict.fromkeys((*requirement.flags, *more)))
     return replace(
         row,
         name=f"{row.name}{FROM_POWER_ON}",

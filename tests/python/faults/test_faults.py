@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -73,30 +73,6 @@ def test_frames_arrive_as_the_fault_says() -> None:
     assert arrive(bus.late("BASE_SAMPLE", 1.0))[5:9] == [(3, 3, 0), (3, 2, 1), (4, 4, 0), (4, 3, 1)]
     assert arrive(bus.repeated("LEVER_SAMPLE"))[4:7] == [(2, 2, 0), (2, 2, 0), (2, 2, 1)]
     assert arrive(bus.stale("BASE_SAMPLE"))[5:8] == [(2, 2, 1), (3, 3, 0), (3, 2, 1)]
-
-
-SAMPLES, KINDS = ("lever", "grip", "base"), ("extended", "remote", "error")
-OF_MESSAGES = {*(f"flip_{byte}" for byte in range(8)), "crc", "length_0", "length_7", "twice", "counter_frozen", *KINDS}
-OF_LOSS = {*(f"lost_{share}" for share in (1, 5, 10, 20, 50)), *(f"burst_{time}s" for time in (0.05, 0.3, 2))}
-OF_SAMPLES = {"masquerade", "counter_ahead", "late", "swapped", "stale"}
-SIGNALS = ("theta", "theta_dot", "tau_m", "z_ddot")
-FOR_GOOD = {"invalid", "saturated", "stuck", "zero", "sign"}
-OF_SIGNALS = FOR_GOOD | {"not_available", "step", "drift", "gain_half", "gain_double", "gain_drift", "spikes"}
-OF_CLOCK = {"stands", "back", "crawls", "half", "1.1", "2", "wraps", "jumps_1h", "jumps_back_10s"}
-
-
-def each_of(things: Iterable[str], faults: Iterable[str]) -> set[str]:
-    return {f"{thing}_{fault}" for thing in things for fault in faults}
-
-
-def test_each_message_signal_and_clock_has_every_fault() -> None:
-    """What does not end has rows from power-on, and what parameters that are held may not mind has rows with those."""
-    lasting = each_of(SAMPLES, OF_LOSS) | each_of((*SIGNALS, "grip_force"), OF_SIGNALS) | each_of(["clock"], OF_CLOCK)
-    names = lasting | {f"{name}_frozen" for name in lasting} | each_of((*SAMPLES, "command"), OF_MESSAGES)
-    names |= each_of(SAMPLES, OF_SAMPLES) | each_of(each_of(SIGNALS, FOR_GOOD), ["from_power_on"])
-    names |= each_of(("estimator", "preload", "adaptation", "freeze", "dither"), ["switched"])
-    assert names - ROWS.keys() == set()
-    assert {name for name in each_of((*SAMPLES, "command"), KINDS) if ROWS[name].quick} == {"lever_extended"}
 
 
 @pytest.mark.parametrize(("usual", "expected"), [(False, []), (True, [250, 500])])
