@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from distributed import KilledWorker
 from lever_cdkf.cli.main import main
+from lever_cdkf.errors import LeverError
 from lever_sil.campaign import chunks, session, spec
 from lever_sil.campaign.chunks import Chunk, Plan
 from lever_sil.commands import campaign
@@ -122,3 +123,133 @@ def test_flights_that_killed_their_workers_are_named(
     monkeypatch.setattr(campaign, "_run", lambda *_arguments: made)
     assert main(["campaign", str(file), "-o", str(folder)]) == 1
     assert "12 runs missing: flights 3 to 5, 21 to 23 killed their workers" in capsys.readouterr().err
+
+
+class Done(Client):
+    """Every chunk is done as soon as it is given, in some way."""
+
+    def __init__(self, plan: Plan, error: Exception | None = None, status: str = "finished") -> None:
+        super().__init__(plan, set())
+        self.error, self.of_futures = error, status
+
+    def submit(self, *arguments: Any, key: str, pure: bool) -> Future:
+        future = super().submit(*arguments, key=key, pure=pure)
+        chunk = self.given[-1][1]
+        future.error, future.rows, future.status = self.error, self.plan.runs(chunk), self.of_futures  # type: ignore[assignment]
+        self.given.clear()
+        add = future.add_done_callback
+
+        def at_once(call: Callable[[Future], None]) -> None:
+            add(call)
+            call(future)
+
+        future.add_done_callback = at_once
+        return future
+
+
+def begun(client: Any, plan: Plan, folder: Path) -> session.Session:
+    return session.run(plan, folder, client, lambda *_: None)
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (LeverError("the worker on a has another build"), "flights 0 to 0: the worker on a has another build"),
+        (MemoryError("no\n  memory"), "flights 0 to 0: MemoryError: no memory"),
+    ],
+)
+def test_what_fails_on_a_worker_is_said_in_a_line(error: Exception, said: str, small: Plan, tmp_path: Path) -> None:
+    """An error of ours as it is, another with its kind."""
+    with pytest.raises(LeverError) as refused:
+        begun(Done(small, error), small, tmp_path)
+    assert str(refused.value) == said
+
+
+def test_a_session_counts_rows_and_processor_time(small: Plan, tmp_path: Path) -> None:
+    chunks.make(small, small.chunk(3), tmp_path)
+    done = begun(Done(small), small, tmp_path)
+    assert (done.runs, done.seconds, done.lost) == (46, 23.0, [])
+
+
+@pytest.mark.parametrize("status", ["cancelled", "lost"])
+def test_a_scheduler_that_is_gone_is_said_with_what_to_do(status: str, small: Plan, tmp_path: Path) -> None:
+    clients: list[Any] = [Done(small, status=status), Done(small)]
+    clients[1].status = "closed"
+    for client in clients:
+        with pytest.raises(LeverError, match=r"the scheduler is gone; .* repeat the command with --resume"):
+            begun(client, small, tmp_path)
+
+
+def test_workers_that_are_gone_for_five_minutes_end_it(
+    small: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not while there are some, nor before."""
+
+    class Idle(Client):
+        def nthreads(self) -> dict[str, int]:
+            return {"a": 1} if now[0] < 1000.0 else {}
+
+    now = [0.0]
+
+    def following(*_: Any) -> None:
+        now[0] += 100.0
+
+    monkeypatch.setattr(session, "_next", following)
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    with pytest.raises(LeverError, match="all workers are gone; what is finished is kept: go on with --resume"):
+        begun(Idle(small, set()), small, tmp_path)
+    assert now[0] == 1300.0, "seen last at 900 s"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "left"), [(1.0, "23 s"), (3.87, "89 s"), (3.92, "2 min"), (230.0, "88 min"), (236.0, "1.5 h")]
+)
+def test_the_time_left_is_in_words(
+    seconds: float, left: str, small: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After the first chunk of 24: 23 times what that took."""
+    now, shown = [0.0], []
+
+    def following(_client: Any, finished: queue.Queue[Future], _tick: Any) -> Future:
+        now[0] = seconds
+        return finished.get_nowait()
+
+    monkeypatch.setattr(session, "_next", following)
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    client: Any = Done(small)
+    session.run(small, tmp_path, client, lambda *progress: shown.append(progress))
+    assert shown[0] == (2, 48, f"2 of 48 runs kept, {left} left")
+
+
+def test_a_worker_makes_its_chunk_or_says_what_it_lacks(
+    small: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows, seconds = session.work(small, small.chunk(0), tmp_path)
+    assert rows == 2
+    assert 0.0 < seconds < 10.0
+    assert small.done(tmp_path) == {0}
+    with pytest.raises(LeverError, match=f"has no folder {tmp_path}/not: it must be on a file system that all share"):
+        session.work(small, small.chunk(0), tmp_path / "not")
+    monkeypatch.setattr(session, "fingerprint", lambda _spec: "another")
+    with pytest.raises(LeverError, match="has another build of lever-cdkf: install the same everywhere"):
+        session.work(small, small.chunk(0), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("bokeh", "page"), [(object(), "http://a:1/status"), (None, "http://a:1/info/main/workers.html")]
+)
+def test_the_dashboard_is_what_dask_can_show(
+    bokeh: object, page: str, small: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    client: Any = Client(small, set())
+    client.dashboard_link = "http://a:1/status"
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: bokeh if name == "bokeh" else None)
+    assert session.dashboard(client) == page
+
+
+def test_no_scheduler_is_said_in_a_line() -> None:
+    with (
+        pytest.raises(LeverError, match="no Dask scheduler at nonsense://x: ValueError: "),
+        session.connected("nonsense://x", 1),
+    ):
+        raise AssertionError
