@@ -135,7 +135,7 @@ class Done(Client):
     def submit(self, *arguments: Any, key: str, pure: bool) -> Future:
         future = super().submit(*arguments, key=key, pure=pure)
         chunk = self.given[-1][1]
-        future.error, future.rows, future.status = self.error, self.plan.runs(chunk), self.of_futures  # type: ignore[assignment]
+        future.error, future.rows, future.status = self.error, self.plan.runs(chunk), self.of_futures
         self.given.clear()
         add = future.add_done_callback
 
@@ -143,7 +143,7 @@ class Done(Client):
             add(call)
             call(future)
 
-        future.add_done_callback = at_once
+        future.add_done_callback = at_once  # type: ignore[method-assign]
         return future
 
 
