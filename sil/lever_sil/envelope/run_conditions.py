@@ -99,8 +99,8 @@ def _result(
     except SettingsError as error:
         return EnvelopeResult(row, {}, problem=str(error).partition(";")[0])
     if recording is None:
-        loop = row.closed_loop or ClosedLoop()
-        recording, track = firmware.closed_loop(config, row.motion, seeds, loop, tick)
+        assert row.closed_loop is not None
+        recording, track = firmware.closed_loop(config, row.motion, seeds, row.closed_loop, tick)
     else:
         track = firmware.estimates(config, measured(recording, row.sensors, seeds), recording.response is not None)
     outcome = Outcome(recording, track, row.window, row.events, outcomes.get(row.against or ""), row.followed)
