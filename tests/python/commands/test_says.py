@@ -21,8 +21,13 @@ from lever_sil.commands import sim
 from lever_sil.envelope import conditions as envelope
 from lever_sil.envelope import run_conditions as envelope_run
 from lever_sil.envelope.condition import Condition
+from lever_sil.faults import matrix
+from lever_sil.faults.rows import ROWS
 from lever_sil.run import runner
 from lever_sil.scenarios import scenario
+from lever_sil.study.baselines import BASELINES
+from lever_sil.study.compare import cases, entrants, run_cases
+from lever_sil.study.compare_envelope import run_estimators
 from python.conftest import Refused, Run
 
 SHORT = ("--set", "duration=1 s", "--set", "converged_after=0.2 s", "--set", "limits={}")
@@ -290,3 +295,115 @@ def test_a_response_has_no_keys_of_an_airframe(measured: Callable[[float], Path]
     said = refused("aircraft", measured(0.5), "gearing=0.4")
     assert "a response has no gearing; it may have gain_sigma, phase_sigma, warning, alarm, response_gearing" in said
     assert "must begin with a line `states, N`" in refused("aircraft", "--state-space", measured(0.5))
+
+
+# --- what is run -----------------------------------------------------------------------------------------------------
+
+
+class StoppedError(Exception):
+    """Instead of a run."""
+
+
+def asked(lever: Run, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> tuple[set[str], set[str], cases.Plan]:
+    """Return the cases and estimators that `lever compare` would run, and how much of each."""
+    found: list[Any] = []
+
+    def tasks(*given: Any) -> list[Any]:
+        found.extend((given[2], task_list(*given)))
+        raise StoppedError
+
+    task_list = run_cases.tasks
+    with monkeypatch.context() as patched:
+        patched.setattr(run_cases, "tasks", tasks)
+        with pytest.raises(StoppedError):
+            lever("compare", *arguments)
+    plan, todo = found
+    return {task.case for task in todo}, {task.entrant for task in todo if task.entrant is not None}, plan
+
+
+def test_compare_runs_what_is_asked_for(lever: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    everything = cases.cases()
+    usual = {name for name, case in everything.items() if case.kind not in ("paper", "wrong tuning", "protocol")}
+    ours = {"dual", "joint", "dual_shipped", "joint_shipped"}
+    names, estimators, plan = asked(lever, monkeypatch)
+    assert (names, plan) == (usual, cases.Plan(40, None, 1))
+    assert estimators >= {*BASELINES, *ours, "dual_r10_q0.1"}
+    names, estimators, plan = asked(lever, monkeypatch, "--quick")
+    assert names == {"lever_fixed_dither_rough", "linear_black_box_trim_base_rough", "step_up", "steady"}
+    assert plan == cases.Plan(8, 12.0, 1)
+    names, estimators, plan = asked(
+        lever, monkeypatch, "--scenarios", "step_up", "steady", "--estimators", "rls", "dual_shipped",
+        *("--seeds", "3", "--seed", "7", "--duration", "5"),
+    )  # fmt: skip
+    assert (names, estimators, plan) == ({"step_up", "steady"}, {"rls", "dual_shipped"}, cases.Plan(3, 5.0, 7))
+    assert asked(lever, monkeypatch, "--quick", "--seeds", "2", "--duration", "3")[2] == cases.Plan(2, 3.0, 1)
+    names = asked(lever, monkeypatch, "--models", "linear_black_box")[0]
+    assert names == {name for name in usual if everything[name].model == "linear_black_box"}
+    methods = "".join(f"    def {name}(self, *given): ...\n" for name in ("start", "step", "estimate"))
+    (tmp_path / "of_mine.py").write_text(f"class Mine:\n{methods}")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(entrants, "_CANDIDATES", {})
+    names, estimators, plan = asked(lever, monkeypatch, "--score", "of_mine:Mine")
+    assert names == {"lever_trim_dither_rough", "step_up"}
+    assert estimators == {"of_mine:Mine", "dual_shipped", "joint_ekf"}
+    assert plan == cases.Plan(20, None, 1)
+    estimators = asked(lever, monkeypatch, "--score", "of_mine:Mine", "--estimators", "rls")[1]
+    assert estimators == {"of_mine:Mine", "rls"}
+
+
+def test_the_experiment_of_the_paper_is_run_by_twenty_seeds(lever: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    names, estimators, plan = asked(lever, monkeypatch, "--paper")
+    assert names == {name for name, case in cases.cases().items() if case.kind == "paper"}
+    assert estimators >= {"algorithm1", "dual_annealing", "joint_robbins_monro"}
+    assert plan == cases.Plan(20, None, 1)
+    some = ("--estimators", "rls", "--seeds", "2", "--seed", "3", "--duration", "4")
+    assert asked(lever, monkeypatch, "--paper", *some)[1:] == ({"rls"}, cases.Plan(2, 4.0, 3))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names", "seeds", "estimators"),
+    [
+        ((), set(envelope.CONDITIONS), 8, ["firmware", "joint_ekf", "joint_ukf", "joint_ekf_hp", "joint_ukf_hp"]),
+        (
+            ("--quick", "--estimators", "joint_ekf", "firmware"),
+            {name for name, each in envelope.CONDITIONS.items() if each.quick}, 8, ["firmware", "joint_ekf"],
+        ),
+        (
+            ("--scenarios", "retrim", "steady", "--seeds", "3", "--estimators", "joint_ukf_hp"),
+            {"steady", "retrim"}, 3, ["joint_ukf_hp"],
+        ),
+    ],
+)  # fmt: skip
+def test_filters_beside_the_firmware_are_run_where_they_are_asked_for(
+    arguments: tuple[str, ...], names: set[str], seeds: int, estimators: list[str], lever: Run,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    def run(wanted: list[str], of: int, by: list[str], jobs: int, _show: Any) -> None:
+        assert (set(wanted), of, sorted(by), jobs) == (names, seeds, sorted(estimators), 2)
+        raise StoppedError
+
+    monkeypatch.setattr(run_estimators, "run", run)
+    with pytest.raises(StoppedError):
+        lever("compare", "--envelope", *arguments, "--jobs", "2")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names", "seeds"),
+    [
+        ((), set(ROWS), 3),
+        (("--quick",), {name for name, row in ROWS.items() if row.quick}, 1),
+        (("--only", "theta_stuck", "lever_crc", "theta_stuck", "--seeds", "7"), {"theta_stuck", "lever_crc"}, 7),
+        (("--quick", "--seeds", "2"), {name for name, row in ROWS.items() if row.quick}, 2),
+    ],
+)
+def test_faults_are_flown_that_are_asked_for(
+    arguments: tuple[str, ...], names: set[str], seeds: int, lever: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run(chosen: list[Any], of: int, _show: Any) -> None:
+        assert len(chosen) == len(names)
+        assert ({row.name for row in chosen}, of) == (names, seeds)
+        raise StoppedError
+
+    monkeypatch.setattr(matrix, "run", run)
+    with pytest.raises(StoppedError):
+        lever("faults", *arguments)
