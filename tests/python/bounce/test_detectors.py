@@ -39,6 +39,34 @@ def test_rover_does_not_take_other_oscillations_for_it(frequency: float, phase: 
     assert level[5 * RATE :].max() < 0.1
 
 
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_rover_allows_a_phase_that_differs_by_60_degrees(way: float) -> None:
+    """At 2 Hz, where a sample is 14°: 46° are taken for the coupling, 77° are not."""
+    near, far = (detectors.rover(oscillating(0.7, 2.0, way * each), lambda s: ANSWER) for each in (0.8, 1.35))
+    assert near[8 * RATE :].min() == pytest.approx(0.6, abs=0.05)
+    assert far[8 * RATE :].max() < 0.1
+
+
+@pytest.mark.parametrize(("frequency", "heard"), [(1.2, False), (1.6, True), (6.25, True), (9.0, False)])
+def test_rover_hears_from_1_5_to_8_hz(frequency: float, heard: bool) -> None:
+    level = detectors.rover(oscillating(0.7, frequency), lambda s: ANSWER)[8 * RATE :]
+    assert (level.min() > 0.5) if heard else (level.max() < 0.1)
+
+
+def test_rover_waits_for_five_half_cycles() -> None:
+    """Five eighths of a second at 4 Hz, after the two that tell the phase."""
+    level = detectors.rover(oscillating(0.7), lambda s: ANSWER)
+    assert 0.6 < TIME[np.argmax(level > 0.35)] < 1.2
+
+
+def test_the_spectrum_hears_from_2_to_8_hz_and_forgets_in_two_seconds() -> None:
+    levels = {each: float(detectors.spectrum(oscillating(0.7, each))[-1]) for each in (1.5, 2.0, 5.0, 8.0, 9.0)}
+    assert all(levels[each] > 0.6 for each in (2.0, 5.0, 8.0))
+    assert all(levels[each] < 0.25 for each in (1.5, 9.0))
+    level = detectors.spectrum(oscillating(0.7))
+    assert level[2 * RATE - 1] == pytest.approx(0.7 * (1.0 - math.exp(-1.0)), rel=0.05)
+
+
 def test_the_spectrum_has_the_amplitude_of_an_oscillation() -> None:
     level = detectors.spectrum(oscillating(0.7))
     assert level[-1] == pytest.approx(0.7, rel=0.05)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lever_cdkf.cli.tables import Row
+from lever_cdkf.cli.tables import Row as TableRow
 from lever_cdkf.report.typesetting import in_html
 from lever_sil.acceptance.excerpt import TITLES, Excerpt
 from lever_sil.bounce import bounce_page, story
@@ -17,8 +17,9 @@ from lever_sil.bounce.conditions import CONDITIONS
 from lever_sil.bounce.measure import Excerpt as BounceExcerpt
 from lever_sil.bounce.run_conditions import BounceResult
 from lever_sil.soak import soak, soak_page
-from lever_sil.study.figures import catalogue, plotted
-from lever_sil.study.figures.description import LOOKS, Band, Curve, Surface
+from lever_sil.study.figures import catalogue, plotted, runs
+from lever_sil.study.figures.description import LOOKS, Band, Column, Curve, Figure, Row, Surface
+from lever_sil.study.matched import Condition, matched
 from python.report.reading import Reader, figures, unpack
 from python.study.shown import figure_of
 from python.study.test_figures_maps import map_figure
@@ -41,7 +42,7 @@ def of_pages() -> dict[str, Spec]:
     row = CONDITIONS["limit_none"]
     result = BounceResult(row, {row.figures[0]: np.array([1.0])}, runs=["a"], excerpt=flight)
     hours = soak.SoakResult([soak.Part(soak.Sums(seconds=300.0), 1.0)] * 2, 1.0, Counter())
-    rows: list[Row] = [part.sums.row() for part in hours.parts]
+    rows: list[TableRow] = [part.sums.row() for part in hours.parts]
     return {
         "bounce": next(iter(figures(Reader(bounce_page.build([result], 1))).values())),
         "soak": next(iter(figures(Reader(soak_page.build(hours, rows, ""))).values())),
@@ -63,11 +64,11 @@ def known(spec: Any) -> Any:
 
 def test_plotly_knows_everything_that_it_is_given() -> None:
     """Of what it does not know it says nothing in a browser, and draws something else."""
-    from plotly.graph_objects import Figure
+    from plotly import graph_objects
 
     for name, spec in (of_figures() | of_pages() | {"map": plotted.map_spec(map_figure())}).items():
         assert spec.keys() <= {"data", "layout", "over_time"}, name
-        Figure({"data": known(spec["data"]), "layout": known(spec["layout"])})
+        graph_objects.Figure({"data": known(spec["data"]), "layout": known(spec["layout"])})
 
 
 def test_time_is_shared_on_pages_of_one_run_only() -> None:
@@ -122,6 +123,39 @@ def test_a_chart_is_as_high_as_its_rows_and_has_its_time() -> None:
             assert tuple(below[0]["range"]) == pytest.approx(figure.x_range)
             marks = {shape["x0"] for shape in layout.get("shapes", []) if shape["x0"] == shape.get("x1")}
             assert marks == set(figure.marks)
+
+
+def test_what_is_drawn_fills_its_chart() -> None:
+    """A twentieth of what is drawn is left on either side, or a tenth above where a chart begins at 0."""
+    x = np.linspace(0.0, 1.0, 11)
+
+    def limits(*values: float, **more: Any) -> tuple[float, float]:
+        curve = Curve(x, np.resize(np.array(values), 11), "curve", "estimate")
+        row = Row("y [1]", (curve, Band(x, curve.y - 1.0, curve.y + 1.0, "band", "chance")))
+        return Figure("a", "a", "a", (Column("", (row,)),), (0.0, 1.0), **more).limits()[0]
+
+    assert limits(3.0, 11.0) == pytest.approx((2.0 - 0.5, 12.0 + 0.5))
+    assert limits(*[99.0] * 5, *[0.0] * 6, scaled_from=0.5) == pytest.approx((-1.1, 1.1))
+    figure = figure_of("consistency")
+    ((_, top), other) = figure.limits()
+    (column,) = figure.columns
+    assert not isinstance(column.content, Surface)
+    drawn = [trace.y.max() for row in column.content for trace in row.traces if isinstance(trace, Curve)]
+    assert other == (0.0, top)
+    assert 1.05 * max(drawn) < top < 1.15 * max(drawn)
+
+
+def test_a_figure_is_of_forty_runs_of_twenty_seconds_in_charts_about_an_inch_high() -> None:
+    assert (runs.Extent().duration, runs.Extent().runs) == (20.0, 40)
+    for name in catalogue.FIGURES:
+        figure = figure_of(name)
+        surfaces = any(isinstance(column.content, Surface) for column in figure.columns)
+        assert (1.9 if surfaces else 0.75) < figure.row_height < (2.1 if surfaces else 1.25)
+        assert figure.scaled_from <= 0.05 * figure.x_range[1]
+    batch = matched(Condition("lever", "fixed"), 1, 2.0, 1)
+    shown = runs.shown(batch)
+    assert (shown[0], shown[-1], len(shown)) == (0, batch.samples - 1, 400)
+    assert runs.late(np.arange(11.0)).tolist() == [False] * 5 + [True] * 6
 
 
 def test_a_surface_has_its_axes_its_scale_and_a_curve_above_it() -> None:
