@@ -13,7 +13,7 @@ from lever_cdkf.firmware.library import lib
 from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.aircraft import aircraft, stability
 from lever_sil.aircraft.aircraft import Coupled
-from lever_sil.bounce import flights, measure, pilots
+from lever_sil.bounce import conditions, flights, measure, pilots
 from lever_sil.bounce.flights import AIRCRAFT, Plan
 from lever_sil.scenarios import inputs
 from python.aircraft.loops import loop_of, margins
@@ -67,6 +67,36 @@ def test_a_stopped_clock_is_one() -> None:
     faults: FloatArray = flown.health["faults"]
     assert not (faults[flown.notes < 2.0] & lib.LEVER_FAULT_CLOCK).any()
     assert (faults[flown.notes > 2.1] & lib.LEVER_FAULT_CLOCK).all()
+
+
+@pytest.mark.parametrize("corner", [0.0, 1.0])
+def test_what_is_used_is_the_corrected_angle_a_sample_late_through_the_low_pass(corner: float) -> None:
+    """Whose step response is 1 - exp(-2 pi f t)."""
+    plan = Plan("uh60_like", 1, pilots.table(pilots.arm(1)), 0.2, duration=1.0, low_pass=corner)
+    flown = flights.fly(plan)
+    steps, time = np.where(flown.time < 0.5, 0.0, 1.0), flown.time
+    made = replace(flown, theta=np.zeros_like(time), correction=steps)
+    at = time[501:] - 0.5
+    expected = 1.0 - np.exp(-2.0 * math.pi * corner * at) if corner else np.ones_like(at)
+    np.testing.assert_allclose(made.corrected[501:], expected, atol=1e-9)
+    assert not made.corrected[:501].any()
+
+
+def test_the_table_of_an_aircraft_is_off_by_what_is_stated() -> None:
+    """By 5 % and 0.05 rad on average, and the way to the seat by up to 10 % and 0.1 rad; times a factor of the plan."""
+    plan = Plan("uh60_like", 1, pilots.table(pilots.arm(1)), 0.2, airframe=conditions.AT_6)
+    responses, seats = [], []
+    for seed in range(60):
+        table = flights.uncertain_response(replace(plan, seed=seed)).pointer
+        responses.append(complex(table.real[8], table.imaginary[8]))
+        seats.append(abs(table.seat_direct))
+    low = flights.uncertain_response(replace(plan, seed=3, table_gain=0.8, table_sigma=0.3)).pointer
+    assert complex(low.real[8], low.imaginary[8]) == pytest.approx(0.8 * responses[3], rel=1e-5)
+    assert low.gain_sigma == pytest.approx(0.3)
+    response = np.array(responses) / np.mean(responses)
+    assert np.std(np.abs(response)) == pytest.approx(0.05, rel=0.35)
+    assert np.std(np.angle(response)) == pytest.approx(0.05, rel=0.35)
+    assert 0.1 < np.std(seats) / np.mean(seats) < 0.3, "of a fit, which an error of the phase moves more"
 
 
 def test_a_refused_command_ends_the_flight(monkeypatch: pytest.MonkeyPatch) -> None:

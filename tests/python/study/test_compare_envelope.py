@@ -158,6 +158,45 @@ def test_a_table_has_median_and_worst() -> None:
     assert coverage == [{"condition": "a", "firmware": "90 / 0"}]
 
 
+def test_rows_have_median_and_worst_as_numbers() -> None:
+    one = EstimatorResult("a", "joint_ekf", np.array([1.0, 2.0, 6.0]), np.array([90.0, 95.0, 10.0]))
+    assert tables.rows([one]) == [
+        {
+            "condition": "a", "estimator": "joint_ekf", "runs": 3, "rms median [%]": 2.0, "rms worst [%]": 6.0,
+            "covered median [%]": 90.0, "covered worst [%]": 10.0,
+        }
+    ]  # fmt: skip
+    titles = list(tables.tables([one], 3))
+    assert titles == [
+        "rms error of f_n (θ/z̈ of other pilots) [%], median / worst of 3 pilots or more",
+        "share of time within ±2σ [%], median / worst of 3 pilots or more",
+    ]
+
+
+def test_an_estimator_that_was_not_run_in_a_condition_has_an_empty_cell() -> None:
+    both = results("a", 3, firmware=1.0, joint_ekf=2.0) + results("b", 3, firmware=1.0)
+    errors, _ = tables.tables(both, 3).values()
+    assert [list(row) for row in errors] == [["condition", "firmware", "joint_ekf"]] * 2
+    assert (errors[1]["condition"], errors[1]["joint_ekf"]) == ("b", "")
+
+
+def test_who_broke_down_is_not_compared_and_who_is_larger_is_named() -> None:
+    found = results("a", 8, firmware=2.0, joint_ekf=1.0, joint_ukf=3.0) + results("b", 8, joint_ekf=1.0)
+    assert list(tables.verdicts(found)) == [
+        "The firmware's errors against joint_ekf: smaller in 0 conditions, larger in 1 (a), no significant difference "
+        "in 0.",
+        "The firmware's errors against joint_ukf: smaller in 1 conditions, larger in 0, no significant difference in "
+        "0.",
+    ]
+    assert tables.differences(results("a", 8, firmware=2.0, joint_ekf=np.inf)) == {}
+
+
+def test_of_pilots_without_a_natural_frequency_the_feedthrough_is_compared() -> None:
+    arm, hand = conditions.CONDITIONS["steady"], conditions.CONDITIONS["mayo_ectomorphic"]
+    assert run_estimators.figures(arm) == ("f_n rms", "f_n covered")
+    assert run_estimators.figures(hand) == ("θ/z̈ rms", "θ/z̈ covered")
+
+
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     short = Condition("short", "title", Motion(duration=1.0), start=0.5, quick=True)
     slow = Condition("slow", "title", Motion(duration=100.0))
