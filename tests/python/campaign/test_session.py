@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import queue
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
+import dask
 import pytest
 from distributed import KilledWorker
 from lever_cdkf.cli.main import main
@@ -252,4 +254,74 @@ def test_no_scheduler_is_said_in_a_line() -> None:
         pytest.raises(LeverError, match="no Dask scheduler at nonsense://x: ValueError: "),
         session.connected("nonsense://x", 1),
     ):
+        raise AssertionError
+
+
+class Cluster:
+    """Notes how it is started."""
+
+    def __init__(self, **options: Any) -> None:
+        self.options = options
+        self.settings = {name: dask.config.get(f"distributed.{name}") for name in (
+            "nanny.pre-spawn-environ", "worker.preload", "deploy.lost-worker-timeout", "logging.distributed"
+        )}  # fmt: skip
+
+    def __enter__(self) -> Cluster:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.closed = True
+
+
+class Connected(Cluster):
+    """A client of it, or of a scheduler."""
+
+    threads: ClassVar[dict[str, int]] = {"a": 1}
+
+    def __init__(self, of: Any, **options: Any) -> None:
+        self.of, self.options = of, options
+
+    def nthreads(self) -> dict[str, int]:
+        return self.threads
+
+
+@pytest.fixture
+def dask_of_tests(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("distributed.LocalCluster", Cluster)
+    monkeypatch.setattr("distributed.Client", Connected)
+
+
+@pytest.mark.usefixtures("dask_of_tests")
+def test_workers_of_this_machine_are_as_many_as_asked_for_with_a_thread_each() -> None:
+    """Each keeps the memory of its arrays, has no limit that would kill it, and may be slow to start again."""
+    before = dask.config.get("distributed.worker.preload")
+    with session.connected(None, 3) as made:
+        client: Any = made
+        cluster = client.of
+    assert {name: cluster.options[name] for name in ("n_workers", "threads_per_worker", "memory_limit")} == {
+        "n_workers": 3, "threads_per_worker": 1, "memory_limit": 0
+    }  # fmt: skip
+    assert cluster.options["dashboard_address"] == "127.0.0.1:0"
+    assert cluster.options["silence_logs"] == logging.CRITICAL
+    kept = str(256 * 2**20)
+    assert cluster.settings["nanny.pre-spawn-environ"] == {
+        "MALLOC_TRIM_THRESHOLD_": kept, "MALLOC_MMAP_THRESHOLD_": kept
+    }  # fmt: skip
+    assert cluster.settings["deploy.lost-worker-timeout"] == "300 s"
+    assert cluster.settings["logging.distributed"] == "critical"
+    (preloaded,) = cluster.settings["worker.preload"]
+    compile(preloaded, "preload", "exec")
+    assert cluster.closed
+    assert client.closed
+    assert dask.config.get("distributed.worker.preload") == before
+
+
+@pytest.mark.usefixtures("dask_of_tests")
+def test_a_scheduler_must_have_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+    with session.connected("tcp://a:1", 1) as made:
+        client: Any = made
+    assert (client.of, client.options) == ("tcp://a:1", {"timeout": 10.0})
+    monkeypatch.setattr(Connected, "threads", {})
+    said = r"the scheduler at tcp://a:1 has no workers yet: start some \(dask worker tcp://a:1\)"
+    with pytest.raises(LeverError, match=said), session.connected("tcp://a:1", 1):
         raise AssertionError

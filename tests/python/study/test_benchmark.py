@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -142,6 +143,20 @@ def test_what_is_no_estimator_is_said_in_a_line(name: str, says: str) -> None:
     with pytest.raises(LeverError, match=re.escape(says)) as caught:
         candidate(name)
     assert "\n" not in str(caught.value)
+
+
+def test_a_class_is_found_in_the_folder_where_the_command_is_called(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    methods = "".join(f"    def {name}(self, *given): ...\n" for name in ("start", "step", "estimate"))
+    folder = tmp_path / "elsewhere"
+    folder.mkdir()
+    (folder / "of_this_folder.py").write_text(f"class Here:\n{methods}")
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    with pytest.raises(LeverError, match="cannot be imported"):
+        candidate("of_this_folder:Here")
+    monkeypatch.chdir(folder)
+    assert callable(candidate("of_this_folder:Here"))
 
 
 def test_an_estimate_of_another_shape_is_refused() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lever_cdkf.report.figure import SERIES, Figure
 from lever_sil.study.baselines import BASELINES
-from lever_sil.study.compare import charts, compare_page, table
+from lever_sil.study.compare import charts, compare_page, evaluation, table
 from lever_sil.study.compare.cases import Plan
 from lever_sil.study.compare.run_cases import Results
 from python.report.reading import Reader, figures, unpack
@@ -159,6 +159,17 @@ def test_each_estimator_has_a_colour_of_the_page() -> None:
     spec = drawn(charts.settling(stepped(), "step_up"))
     colours = [trace["marker"]["color"] for trace in spec["data"][::2]]
     assert colours == [f"@{charts.COLOURS[name]}" for name in ("dual", "joint", "rls")]
+
+
+def test_two_estimators_are_enough_to_be_compared_and_one_is_not() -> None:
+    time = np.arange(1.0, 61.0)
+    errors = 0.1 * np.random.default_rng(1).standard_normal((8, 60, 5))
+    outcomes = {(CASE, "dual"): made_up(errors, time), (CASE, "joint"): made_up(1.5 * errors, time)}
+    for names, differ in ((("dual", "joint"), {(CASE, "joint")}), (("dual",), set())):
+        results = Results(Plan(8), {(CASE, name): outcomes[CASE, name] for name in names}, {})
+        of_errors, of_times = evaluation.compare(results, evaluation.judge(results))
+        assert of_errors.keys() == differ
+        assert of_times == {}
 
 
 # --- the page --------------------------------------------------------------------------------------------------------
