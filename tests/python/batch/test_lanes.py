@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,7 +75,7 @@ def test_a_lever_that_nothing_moves_rests_at_its_trim() -> None:
 def test_torque_moves_the_lever_to_where_the_springs_hold_it() -> None:
     """And the hand feels what the lever's own spring does not take."""
     given = still()
-    nothing = dict.fromkeys(("z_ddot", "disturbance", "kick"), np.zeros((4001, 3)))
+    nothing: dict[str, Any] = dict.fromkeys(("z_ddot", "disturbance", "kick"), np.zeros((4001, 3)))
     given = replace(given, tau_m=np.full((4001, 3), 0.4), **nothing)
     theta, theta_dot = plant.run(given)
     end, trim, h = theta[-1], given.trim[0], given.hardware
@@ -125,7 +126,7 @@ def test_lanes_lie_side_by_side_and_each_is_itself() -> None:
 
 def test_signs_of_life_come_each_ten_thousand_samples() -> None:
     calls: list[int] = []
-    nothing = dict.fromkeys(("tau_m", "disturbance", "kick"), np.zeros((1, 1)))
+    nothing: dict[str, Any] = dict.fromkeys(("tau_m", "disturbance", "kick"), np.zeros((1, 1)))
     given = replace(still(1), z_ddot=np.zeros((25_001, 1)), **nothing)
     plant.run(given, lambda: calls.append(1))
     assert len(calls) == 3
