@@ -30,6 +30,13 @@ from lever_sil.study.compare import cases, entrants, run_cases
 from lever_sil.study.compare_envelope import run_estimators
 from python.conftest import Refused, Run
 
+
+@pytest.fixture(autouse=True)
+def _nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forget whose estimator took part."""
+    monkeypatch.setattr(entrants, "_CANDIDATES", {})
+
+
 SHORT = ("--set", "duration=1 s", "--set", "converged_after=0.2 s", "--set", "limits={}")
 
 
@@ -342,7 +349,6 @@ def test_compare_runs_what_is_asked_for(lever: Run, monkeypatch: pytest.MonkeyPa
     methods = "".join(f"    def {name}(self, *given): ...\n" for name in ("start", "step", "estimate"))
     (tmp_path / "of_mine.py").write_text(f"class Mine:\n{methods}")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(entrants, "_CANDIDATES", {})
     names, estimators, plan = asked(lever, monkeypatch, "--score", "of_mine:Mine")
     assert names == {"lever_trim_dither_rough", "step_up"}
     assert estimators == {"of_mine:Mine", "dual_shipped", "joint_ekf"}
