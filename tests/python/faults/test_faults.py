@@ -180,6 +180,127 @@ def test_a_demand_that_is_not_kept_is_named(what: str, right: Record, pilot: Pil
     assert set(broken) <= {what, "error after"}
 
 
+# --- what is measured, at the edges of what is allowed ---------------------------------------------------------------
+
+END = round(TIME[1] / PERIOD)
+"""The first sample after the fault."""
+
+
+def measured(
+    record: Record, right: Record, pilot: Pilot, requirement: judge.Requirement | None = None
+) -> judge.Verdict:
+    return judge.judge(requirement or judge.Requirement(), record, right, pilot.truth, TIME)
+
+
+def known(right: Record, pilot: Pilot) -> Record:
+    """Return a record whose estimates are the truth, a tenth uncertain, without any flag."""
+    estimate, health, of = right.estimate.copy(), right.health.copy(), pilot.truth
+    for name, truth in (("natural_frequency", of["f_n"]), ("damping_ratio", of["zeta"])):
+        estimate[name], estimate[f"{name}_sigma"] = truth, 0.1 * np.abs(truth)
+    for i, name in enumerate(("m_p", "c_p", "k_p")):
+        estimate["parameter"][:, i], estimate["parameter_sigma"][:, i] = of[name], 0.1 * of[name]
+    health["faults"], health["mode"] = 0, lib.LEVER_MODE_RUN
+    return replace(right, estimate=estimate, health=health)
+
+
+def flagged(record: Record, *stretches: tuple[int, int]) -> Record:
+    """Return it with a fault in these stretches of samples after the end of the fault."""
+    health = record.health.copy()
+    for first, last in stretches:
+        health["faults"][END + first : END + last] = lib.LEVER_FAULT_THETA
+    return replace(record, health=health)
+
+
+def test_all_is_right_where_nothing_is_wrong(right: Record, pilot: Pilot) -> None:
+    verdict = measured(known(right, pilot), right, pilot)
+    assert verdict.broken == []
+    named = ("not finite", "unanswered", "back", "silent", "error after")
+    assert {name: verdict.measured[name] for name in named} == pytest.approx(dict.fromkeys(named, 0.0), abs=1e-4)
+    assert verdict.measured["covered"] == 100.0
+
+
+def test_the_firmware_is_back_when_it_has_been_calm_for_half_a_second(right: Record, pilot: Pilot) -> None:
+    """A pause of 0.49 s between two flags is none, one of half a second is."""
+    record = known(right, pilot)
+    for pause, back in ((490, 0.89), (500, 0.3)):
+        spoilt_record = flagged(record, (0, 300), (300 + pause, 400 + pause))
+        assert measured(spoilt_record, right, pilot).measured["back"] == pytest.approx(back)
+    assert measured(flagged(record, (0, 2000)), right, pilot).broken == []
+    assert measured(flagged(record, (0, 2001)), right, pilot).broken == ["back"]
+    other = record.health.copy()
+    other["faults"][END : END + 3000] = lib.LEVER_FAULT_EXCITATION
+    assert measured(replace(record, health=other), right, pilot).measured["back"] == 0.0, "it learns"
+    other["mode"][END : END + 700] = lib.LEVER_MODE_COAST
+    assert measured(replace(record, health=other), right, pilot).measured["back"] == pytest.approx(0.7)
+
+
+def off(record: Record, sigmas: float, first: int, last: int) -> Record:
+    """Return it with k_p off by so many standard deviations in a stretch of samples after the end of the fault."""
+    estimate = record.estimate.copy()
+    where = slice((END + first) // STRIDE, (END + last) // STRIDE)
+    estimate["parameter"][where, 2] += sigmas * estimate["parameter_sigma"][where, 2]
+    return replace(record, estimate=estimate)
+
+
+def test_three_sigma_for_a_second_without_a_flag_is_silent(right: Record, pilot: Pilot) -> None:
+    record = known(right, pilot)
+    for sigmas, length, silent in ((3.1, 1000, 1.0), (-3.1, 990, 0.99), (2.9, 5000, 0.0)):
+        verdict = measured(off(record, sigmas, 0, length), right, pilot)
+        assert verdict.measured["silent"] == pytest.approx(silent)
+        assert verdict.excerpt is not None
+    assert measured(off(record, 3.1, 0, 1010), right, pilot).broken == ["silent"]
+    assert measured(off(record, 3.1, 0, 1000), right, pilot).broken == []
+    shown = measured(off(record, 3.1, 0, 1000), right, pilot)
+    assert shown.excerpt is not None
+    assert shown.excerpt.quantity == "k_p"
+    assert shown.measured["covered"] == pytest.approx(100.0 * (1.0 - 1.0 / 25.0), abs=0.01)
+    both = flagged(off(record, 3.1, 0, 3000), (0, 1500), (2000, 3000))
+    assert measured(both, right, pilot).measured["silent"] == pytest.approx(0.5)
+    before = off(record, 9.0, round(-12.0 / PERIOD), round(-10.1 / PERIOD))
+    assert measured(before, right, pilot).measured["silent"] == 0.0, "before the fault it is not judged"
+
+
+def test_silence_of_twenty_samples_is_a_flag(right: Record, pilot: Pilot) -> None:
+    record = known(right, pilot)
+    health = record.health.copy()
+    health["samples"] = np.arange(1, len(health) + 1)
+    health["samples"][END + 1 : END + 101] = health["samples"][END]
+    silent = judge.is_flagged(replace(record, health=health))
+    assert np.flatnonzero(silent).tolist() == list(range(END + 20, END + 101))
+
+
+@pytest.mark.parametrize(("percent", "broken"), [(2.99, []), (3.01, ["error after"])])
+def test_the_natural_frequency_is_known_to_3_percent_in_the_last_five_seconds(
+    percent: float, broken: list[str], right: Record, pilot: Pilot
+) -> None:
+    record = known(right, pilot)
+    estimate = record.estimate.copy()
+    estimate["natural_frequency"][-round(5.0 / PERIOD / STRIDE) :] *= 1.0 + 0.01 * percent
+    estimate["natural_frequency"][: -round(5.0 / PERIOD / STRIDE)] *= 1.1
+    verdict = measured(replace(record, estimate=estimate), right, pilot)
+    assert verdict.broken == broken
+    assert verdict.measured["error after"] == pytest.approx(percent, rel=1e-3)
+
+
+def test_flags_are_counted_from_the_begin_of_the_fault_and_after_its_end(right: Record, pilot: Pilot) -> None:
+    begin, record = round(TIME[0] / PERIOD), known(right, pilot)
+
+    def shown(first: int, requirement: judge.Requirement) -> judge.Verdict:
+        health = record.health.copy()
+        health["faults"][first] = lib.LEVER_FAULT_GAP
+        return measured(replace(record, health=health), right, pilot, requirement)
+
+    for sample, figure in ((begin, 1.0), (begin + 3, 4.0)):
+        verdict = shown(sample, judge.Requirement(("BASE", "GAP"), 3))
+        assert verdict.measured["to flag"] == figure
+        assert verdict.broken == (["to flag"] if figure > 3.0 else [])
+    assert shown(begin - 1, judge.Requirement(("GAP",), 3)).measured["to flag"] == math.inf
+    for sample, figure in ((END, 1.0), (END + 1, 2.0), (END + 2, 3.0), (END + 3, math.inf)):
+        verdict = shown(sample, judge.Requirement(after=("GAP",)))
+        assert verdict.measured["to flag after"] == figure
+        assert ("to flag after" in verdict.broken) == (figure > 2.0)
+
+
 @pytest.mark.parametrize(
     ("requirement", "words"),
     [

@@ -12,6 +12,9 @@ import pytest
 from lever_cdkf.firmware.config import Config
 from lever_sil.scenarios import scenario
 from lever_sil.study.baselines import BASELINES
+from lever_sil.study.baselines.algorithm1 import Algorithm1
+from lever_sil.study.baselines.lms import Nlms
+from lever_sil.study.baselines.rls import Rls
 from lever_sil.study.compare.cases import Case, Paper, Plan, Protocol, Recorded, Stepped, cases
 from lever_sil.study.compare.entrants import Entrant, entrants
 from lever_sil.study.steps import Step
@@ -224,3 +227,15 @@ def test_published_ones_are_those_of_their_source() -> None:
             assert entrant.title == f"{baseline.title} ({baseline.source})"
             assert entrant.make(cases()["steady"]) is baseline.run
             assert (entrant.ours, entrant.reference) == (False, "")
+
+
+def test_published_ones_are_as_they_were_tuned() -> None:
+    """RLS and LMS by windows of 20 ms above 1 Hz, RLS with a memory of 8 s, LMS with a step of 0.1; 30 ms ahead."""
+    assert BASELINES["rls"].run == Rls(window=0.02, forgetting=8.0, corner=1.0, regularised=False)
+    assert BASELINES["rls_regularised"].run == Rls(window=0.02, forgetting=8.0, corner=1.0, regularised=True)
+    assert BASELINES["lms"].run == Nlms(window=0.02, step=0.1, corner=1.0)
+    assert BASELINES["algorithm1"].run == Algorithm1(ahead=0.0)
+    assert BASELINES["algorithm1_ahead"].run == Algorithm1(ahead=0.03)
+    assert BASELINES.keys() == {
+        *("algorithm1", "algorithm1_ahead", "dual_ekf", "joint_ekf", "joint_ukf", "rls", "rls_regularised", "lms"),
+    }
