@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 import sys
@@ -10,6 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as parquet
 import pytest
 from lever_cdkf.cli.main import main
 from lever_cdkf.errors import LeverError
@@ -71,6 +73,43 @@ def test_what_is_read_is_what_was_drawn_to_the_bit(name: str, files: Path) -> No
         np.testing.assert_array_equal(there[key], values, err_msg=key)
     plan, names = dataset.plan_of(files)
     assert (plan, names) == (replace(PLAN, data=str(files)), [TRIM, FIXED, OTHER])
+
+
+def test_the_files_are_those_that_others_read(files: Path) -> None:
+    """As PAPER.md says, and by the names that are in it: no estimator of another language has our code."""
+    assert {path.name for path in files.iterdir()} == {
+        "benchmark.json",
+        *(f"{name}.parquet" for name in (TRIM, FIXED, OTHER)),
+    }
+    index = json.loads((files / "benchmark.json").read_text(encoding="utf-8"))
+    assert index.keys() == {"format", "version", "seed", "seeds", "duration_s", "cases"}
+    assert (index["format"], index["seed"], index["seeds"], index["duration_s"]) == (1, 1, 2, 1.5)
+    known = index["cases"][TRIM]
+    assert known.keys() == {"model", "preload", "period_s", "knowledge", "settings", "file", "sha256"}
+    assert (known["model"], known["preload"], known["period_s"], known["file"]) == (
+        "lever",
+        "trim",
+        1e-3,
+        f"{TRIM}.parquet",
+    )
+    assert known["knowledge"].keys() == {"guess", "sigma", "walk", "positive", "output_noise", "process_noise"}
+    assert known["settings"]["theta_dot_process_noise"] == 0.1
+    assert (
+        known["sha256"].removeprefix("sha256:") == hashlib.sha256((files / f"{TRIM}.parquet").read_bytes()).hexdigest()
+    )
+    table = parquet.read_table(files / f"{TRIM}.parquet")
+    measured = ["theta_rad", "theta_dot_rad_s", "z_ddot_m_s2", "tau_m_N_m"]
+    true = ["true_theta_rad", "true_theta_dot_rad_s", "true_natural_frequency_Hz", "true_damping_ratio"]
+    assert table.column_names == ["run", "time_s", *measured, *true, "true_m_p", "true_c_p", "true_k_p"]
+    batch = cases()[TRIM].batch(PLAN)
+    rows = table.to_pandas()
+    assert rows["run"].tolist() == [0] * 1500 + [1] * 1500
+    np.testing.assert_allclose(rows["time_s"][1500:], 1e-3 * np.arange(1500))
+    np.testing.assert_array_equal(rows[measured].to_numpy()[1500:], np.hstack((batch.raw_y[1], batch.raw_u[1])))
+    np.testing.assert_array_equal(rows[true[:2]].to_numpy()[:1500], batch.truth.x[0])
+    np.testing.assert_array_equal(rows[true[2:]].to_numpy()[:1500], batch.truth.dynamics[0])
+    assert not any(name.startswith("true_m_p") for name in parquet.read_schema(files / f"{OTHER}.parquet").names)
+    assert dataset.BENCHMARK == ("lever_trim_dither_rough", "step_up")
 
 
 def test_the_same_seeds_give_files_with_the_same_checksums(files: Path, tmp_path: Path) -> None:
