@@ -11,10 +11,11 @@ import pyarrow.parquet as pq
 import pytest
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.native import run_samples
-from lever_sil.campaign import chunks, figures, runs
+from lever_sil.campaign import chunks, figures, runs, summary
 from lever_sil.campaign.chunks import Chunk, Plan
 from lever_sil.campaign.entrants import ENTRANTS, Track
 from lever_sil.campaign.flight import simulate
+from lever_sil.campaign.session import Session
 from lever_sil.campaign.spec import Spec
 from lever_sil.run import runner
 from lever_sil.scenarios import scenario
@@ -170,3 +171,52 @@ def test_another_campaign_in_the_folder_is_refused(small: Plan, tmp_path: Path) 
     for other in (dataclasses.replace(small.spec, seeds=5), dataclasses.replace(small.spec, chunk=3)):
         with pytest.raises(LeverError, match="give another folder"):
             Plan(other).done(tmp_path)
+
+
+def test_rows_have_the_columns_of_the_readme(small: Plan, tmp_path: Path) -> None:
+    chunks.make(small, small.chunk(0), tmp_path)
+    (file,) = tmp_path.iterdir()
+    schema = pq.read_schema(file)
+    figures_of = [f"{what}_{name}" for name in ("m_p", "c_p", "k_p", "natural_frequency", "damping_ratio")
+                  for what in ("rms", "bias", "coverage")]  # fmt: skip
+    numbers, axes = ["run", "point", "seed"], ["pilot.process_noise", "estimator.adaptation"]
+    judged = [*figures_of, "nees", "nis", "settled_s", "flagged"]
+    assert schema.names == [*numbers, "estimator", *axes, *judged, "error"]
+    types = {name: str(schema.field(name).type) for name in schema.names}
+    assert {types[name] for name in numbers} == {"int64"}
+    assert {types[name] for name in (*judged, axes[0])} == {"double"}
+    assert {types[name] for name in ("estimator", axes[1], "error")} == {"string"}
+    assert schema.field(axes[0]).metadata == {b"unit": b"rad/s/sqrt(s)"}
+    assert schema.field(axes[1]).metadata == {b"unit": b"1"}
+    assert not any(schema.field(name).nullable for name in (*numbers, "estimator"))
+    assert schema.metadata == {b"lever_campaign": small.fingerprint.encode(), b"title": b"small"}
+    assert file.name == f"{small.fingerprint}-0000000000-0000000000.parquet"
+    first, second = pq.read_table(file).to_pylist()
+    assert [(row["run"], row["point"], row["seed"], row["estimator"]) for row in (first, second)] == [
+        (0, 0, 1, "dual"), (1, 0, 1, "rls")
+    ]  # fmt: skip
+    assert first["flagged"] is not None
+    assert second["flagged"] is None, "of the firmware only"
+
+
+def test_what_is_summed_up_of_a_campaign_is_what_its_rows_say(small: Plan, tmp_path: Path) -> None:
+    for number in range(4):
+        chunks.make(small, small.chunk(number), tmp_path)
+    rows = [row for file in sorted(tmp_path.glob("*.parquet")) for row in pq.read_table(file).to_pylist()]
+    built = summary.build(small, tmp_path, Session(runs=8, seconds=0.5))
+    assert built == {
+        "title": "small", "campaign": small.fingerprint, "asked": 48, "runs": 8, "failed": 0,
+        "minutes_a_run": pytest.approx(1.0 / 60.0), "real_time_factor_per_core": 16.0,
+    }  # fmt: skip
+    assert summary.build(small, tmp_path, Session())["real_time_factor_per_core"] is None
+    for line, name in zip(summary.by_estimator(small, tmp_path), ("dual", "rls"), strict=True):
+        own = [row for row in rows if row["estimator"] == name]
+        assert (line["estimator"], line["runs"], line["failed"]) == (name, 4, 0)
+        quantities = ("m_p", "c_p", "k_p", "natural_frequency", "damping_ratio")
+        for each in quantities:
+            assert line[f"{each} rms [%]"] == pytest.approx(
+                100.0 * np.median([row[f"rms_{each}"] for row in own]), abs=0.006
+            )
+        least = min(np.mean([row[f"coverage_{each}"] for row in own]) for each in quantities)
+        assert line["least coverage [%]"] == pytest.approx(100.0 * least, abs=0.006)
+    assert summary.errors(tmp_path) == []
