@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from lever_sil.campaign import chunks, spec
+from lever_sil.campaign import chunks, session, spec
 from lever_sil.campaign.chunks import Plan
+from lever_sil.commands import campaign
 from lever_sil.scenarios import scenario
 from python.conftest import Refused, Run
 
@@ -144,3 +148,66 @@ def test_a_folder_of_something_else_is_refused_and_left_alone(
 
 def test_without_resume_what_is_there_is_left_alone(refused: Refused, small_file: Path, done: Path) -> None:
     assert "holds 24 of the 24 chunks of this campaign: add --resume" in refused("campaign", small_file, "-o", done)
+
+
+def test_a_campaign_is_run_by_as_many_workers_as_asked_for_and_its_speed_is_said(
+    lever: Run, small_file: Path, undisturbed: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[tuple[object, int]] = []
+
+    @contextmanager
+    def connected(address: str | None, workers: int) -> Iterator[str]:
+        begun.append((address, workers))
+        yield "client"
+
+    def run(plan: Plan, folder: Path, client: str, _show: object) -> session.Session:
+        assert (client, plan.count) == ("client", 24)
+        for name, content in undisturbed.items():
+            (folder / name).write_bytes(content)
+        return session.Session(runs=48, seconds=0.25)
+
+    monkeypatch.setattr(session, "connected", connected)
+    monkeypatch.setattr(session, "dashboard", lambda client: f"of {client}")
+    monkeypatch.setattr(session, "run", run)
+    for options in ((), ("--workers", "3"), ("--scheduler", "tcp://a:1")):
+        out = tmp_path / str(len(begun))
+        status, printed, error = lever("campaign", small_file, "-o", out, *options)
+        assert (status, error) == (0, "")
+        words = " ".join(printed.split())
+        assert "48 runs in 24 chunks; dashboard: of client" in words
+        assert "48 runs, 0 failed, 192 × real time a core." in words
+        assert f"Written to {out}: summary.json, 24 Parquet files" in words
+        written = json.loads((out / "summary.json").read_text())
+        assert written["real_time_factor_per_core"] == 192.0
+        assert (out / "spec.json").exists()
+    assert begun[:2] == [(None, os.cpu_count()), (None, 3)]
+    assert begun[2][0] == "tcp://a:1"
+
+
+def test_an_interrupted_campaign_says_what_is_kept(
+    lever: Run, small_file: Path, undisturbed: dict[str, bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(plan: Plan, folder: Path, _args: object) -> None:
+        for name in sorted(undisturbed)[:5]:
+            (folder / name).write_bytes(undisturbed[name])
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(campaign, "_run", interrupted)
+    status, _, error = lever("campaign", small_file, "-o", tmp_path)
+    assert (status, error) == (130, "lever: interrupted: 10 of 48 runs kept; go on with --resume\n")
+
+
+def test_a_campaign_of_which_nothing_could_be_made_is_an_error(
+    refused: Refused, small: Plan, small_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lost = [small.chunk(number) for number in range(small.count)]
+    monkeypatch.setattr(campaign, "_run", lambda *_: session.Session(lost=lost))
+    assert "every chunk killed the workers that tried it: give the workers more memory" in refused(
+        "campaign", small_file, "-o", tmp_path
+    )
+
+
+def test_a_run_alone_that_fails_ends_with_1(lever: Run, failing: Path) -> None:
+    status, printed, _ = lever("campaign", failing, "--run", "0")
+    assert status == 1
+    assert "is out of range" in printed

@@ -20,6 +20,7 @@ from lever_sil.plants.sensors import Scale, Spikes, Stuck
 from lever_sil.scenarios import inputs
 from lever_sil.scenarios.scenario import Scenario
 from lever_sil.soak import flights, soak, soak_page
+from python.conftest import Run
 from python.report.reading import Reader, figures, unpack
 
 Content = dict[str, Any]
@@ -309,3 +310,62 @@ def test_the_page_shows_each_hour(troubles: bool) -> None:
     assert chart["layout"]["xaxis"]["range"] == [0.5, 2.5]
     assert [(shape["y0"], shape["y1"]) for shape in chart["layout"]["shapes"]] == [(1.0, 1.0)]
     assert not chart["over_time"]
+
+
+@pytest.mark.parametrize("troubled", [False, True])
+def test_the_command_says_and_writes_what_the_hours_came_to(
+    troubled: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lever: Run
+) -> None:
+    """Two hours; the memory is that of the end."""
+    hours = [replace(judged(0.1, 0.1), seconds=flights.DURATION), replace(judged(0.1, 0.02), seconds=flights.DURATION)]
+    for each in hours:
+        each.counts.update({"recoveries": 2, "lost": 3})
+        each.not_finite = int(troubled)
+    parts = [soak.Part(hours[0], 101.0), soak.Part(hours[1], 102.5)]
+    made = soak.SoakResult(parts, 100.0, Counter({"theta stuck": 4, "base frames lost": 2}))
+    asked: list[tuple[float, int]] = []
+
+    def run(length: float, seed: int, _show: Any) -> soak.SoakResult:
+        asked.append((length, seed))
+        return made
+
+    monkeypatch.setattr(soak, "run", run)
+    page, file = tmp_path / "soak.html", tmp_path / "soak.json"
+    status, printed, error = lever("soak", "--hours", "0.5", "--seed", "7", "-o", page, "--json", file)
+    assert asked == [(0.5, 7)]
+    assert status == int(troubled)
+    assert error == ("lever: soak: 2 estimates were not finite\n" if troubled else "")
+    words = " ".join(printed.split())
+    silent = f"{hours[1].silent_s:.0f}"
+    assert (
+        f"2 flights of 5 min with 6 faults: NEES 13.00 (expected 1), silent errors for {silent} s, 4 restarts of the "
+        "filter, memory +2.5 MiB."
+    ) in words
+    assert f"Written to {tmp_path}: soak.html" in words
+    content = json.loads(file.read_text())
+    assert content.keys() == {"hours", "total", "memory_growth_mib", "faults", "troubles", "provenance"}
+    assert [(hour["hour"], hour["memory [MiB]"]) for hour in content["hours"]] == [(1, 101.0), (2, 102.5)]
+    assert (content["total"]["hour"], content["total"]["memory [MiB]"], content["total"]["lost"]) == ("all", 102.5, 6)
+    assert content["memory_growth_mib"] == 2.5
+    assert content["faults"] == {"base frames lost": 2, "theta stuck": 4}
+    assert content["troubles"] == (["2 estimates were not finite"] if troubled else [])
+    reader = Reader(page.read_text())
+    assert "silent errors for" in "".join(reader.text)
+    assert {"hours", "table"} <= {attributes["id"] for _, attributes in reader.tags if attributes.get("id")}
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [(300.0, "5 minutes"), (3599.0, "60 minutes"), (3600.0, "An hour"), (5400.0, "1.5 hours"), (86400.0, "A day")],
+)
+def test_the_page_says_for_how_long_it_flew(seconds: float, said: str) -> None:
+    result = soak.SoakResult([soak.Part(soak.Sums(seconds=seconds), 1.0)], 1.0, Counter())
+    page = Reader(soak_page.build(result, [part.sums.row() for part in result.parts], ""))
+    assert f"{said} without a reset" in "".join(page.text)
+
+
+@pytest.mark.parametrize(("count", "each"), [(12, 1), (13, None)])
+def test_few_hours_are_each_written_at_the_axis(count: int, each: int | None) -> None:
+    result = soak.SoakResult([soak.Part(soak.Sums(seconds=300.0), 1.0)] * count, 1.0, Counter())
+    page = Reader(soak_page.build(result, [part.sums.row() for part in result.parts], ""))
+    assert figures(page)["chart"]["layout"]["xaxis"].get("dtick") == each
