@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 from lever_cdkf.cli.main import main
 from lever_cdkf.cli.tables import Row
+from lever_cdkf.firmware.config import setting
 from lever_cdkf.firmware.library import lib, struct_dtype
 from lever_sil.plants.excitation import Noise
 from lever_sil.plants.sensors import Scale, Spikes, Stuck
 from lever_sil.scenarios import inputs
 from lever_sil.scenarios.scenario import Scenario
 from lever_sil.soak import flights, soak, soak_page
-from python.conftest import Run
+from python.conftest import Refused, Run
 from python.report.reading import Reader, figures, unpack
 
 Content = dict[str, Any]
@@ -114,6 +115,18 @@ def test_what_is_wrong_shows() -> None:
         "the estimator was in fault for 1 s",
         "memory grew by 30 MiB",
     ]
+
+
+def test_a_page_that_cannot_be_written_is_told_before_the_flights(
+    refused: Refused, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(soak, "run", lambda *_: pytest.fail("flown"))
+    assert "/dev/null/x" in refused("soak", "-o", "/dev/null/x")
+
+
+def test_flights_are_apart_by_more_than_any_gap_that_is_bridged() -> None:
+    assert setting("gap_limit").greatest < flights.AT_REST
+    assert flights.AT_REST * 50 < flights.DURATION
 
 
 def test_sums_of_flights_add_up() -> None:

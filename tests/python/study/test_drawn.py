@@ -277,6 +277,8 @@ def test_an_excerpt_is_drawn_with_its_band_and_flags_at_its_foot(quantity: str, 
     np.testing.assert_allclose(unpack(dots["y"]), floor + 0.02 * (ceiling - floor), rtol=1e-5)
     assert [shape["x0"] for shape in spec["layout"]["shapes"]] == [2.0, 7.0]
     assert spec["layout"]["height"] == 260
+    (x_axis,) = (axis for name, axis in spec["layout"].items() if name.startswith("xaxis"))
+    assert x_axis["range"] == [0.0, 10.0]
 
 
 def test_the_story_of_the_demo_shows_both_flights() -> None:

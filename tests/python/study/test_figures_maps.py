@@ -70,6 +70,13 @@ def test_the_values_that_are_written_are_evenly_spaced_where_they_can_be() -> No
     assert shown == {1: [0], 2: [0, 1], 3: [0, 1, 2], 4: [0, 1, 2, 3], 5: shown[5], 6: shown[6], 7: [0, 2, 4, 6]}
 
 
+def test_cells_meet_halfway_between_their_values_and_one_alone_is_one_wide() -> None:
+    assert Scale("x", (2.0, 4.0, 8.0)).edges.tolist() == [1.0, 3.0, 6.0, 10.0]
+    assert np.exp(NOISE.edges) == pytest.approx([0.01 / 10**0.5, 0.1 / 10**0.5, 10**-0.5, 10**0.5])
+    assert NAMED.edges.tolist() == [-0.5, 0.5, 1.5]
+    assert Scale("x", (3.0,)).edges.tolist() == [2.5, 3.5]
+
+
 def test_large_numbers_are_written_out() -> None:
     assert [maps.written(value) for value in (0.0123, 1.24, 99.9, 1500.0, -1500.0, 3.6e6, "fixed")] == [
         *("0.012", "1.2", "100", "1500", "-1500", "3600000", "fixed")
