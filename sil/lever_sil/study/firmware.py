@@ -18,15 +18,15 @@ EXACT = dict.fromkeys(("z_ddot_gain_sigma", "z_ddot_delay_sigma", "tau_m_gain_si
 
 @dataclass(frozen=True)
 class Firmware:
-    """The firmware as a `data.Estimator`: choices and settings by name, defaults for what is not given.
+    """The firmware as a `data.Estimator`: choices, and settings by name.
 
     Before its first estimate, while it aligns, it reports the first guess. From where it has refused a factor or an
     estimate and started anew, it is said to have broken down.
     """
 
-    model: str = "lever"
-    preload: str = "trim"
-    estimator: str = "dual"
+    model: str
+    preload: str
+    estimator: str
     adaptation: str = "robbins_monro"
     settings: Mapping[str, float] = field(default_factory=dict)
 

@@ -79,3 +79,5 @@ def test_signals_are_watched_by_their_means() -> None:
     watched = Watched.of(np.arange(1010.0), np.ones(1010), 1e-3)
     assert len(watched.theta) == len(watched.z_ddot) == 50
     assert watched.theta[:2].tolist() == [9.5, 29.5]
+    fast = Watched.of(np.arange(1000.0), np.ones(1000), 1e-4)
+    assert fast.theta.tolist() == [99.5, 299.5, 499.5, 699.5, 899.5], "fifty in a second"

@@ -11,7 +11,7 @@ import pytest
 from lever_sil.aircraft.aircraft import Coupled, Fitted, Helicopter, Mode, read_aircraft
 from lever_sil.campaign.axis import Axis
 from lever_sil.campaign.spec import Failure, Spec
-from lever_sil.plants import excitation, trajectories
+from lever_sil.plants import excitation, mayo_plant, trajectories
 from lever_sil.plants.pilots import HandsOff, HystereticPilot, LeverPilot, ReflexPilot
 from lever_sil.plants.sensors import Dropout, Gradual, Late, Sensor, Spikes
 from lever_sil.plants.window import Window
@@ -179,3 +179,39 @@ def test_angles_of_a_lever_may_be_below_0_and_nothing_else(load: Load) -> None:
     assert load(text, "lever.lever_preload_angle=-0.1 rad").true_lever.lever_preload_angle == -0.1
     with pytest.raises(ScenarioError, match=r"lever\.lever_friction"):
         load(text, "lever.lever_friction=-0.1 N m")
+
+
+MINIMAL = """
+title = "t"
+duration = "1 s"
+[pilot]
+trim = "20 deg"
+m_p = "2 kg"
+c_p = "50 N s/m"
+k_p = "2000 N/m"
+"""
+
+
+def test_what_a_scenario_does_not_say_is_as_the_readme_has_it(load: Load) -> None:
+    plain = load(MINIMAL)
+    assert (plain.seed, plain.converged_after, plain.motor.lag, plain.description) == (1, 15.0, 2e-3, "")
+    assert (plain.pilot.model, plain.pilot.preload, plain.pilot.process_noise) == ("lever", "trim", 0.05)
+    assert (plain.base, plain.torque, plain.disturbance, plain.aircraft, plain.limits) == ((), (), (), None, None)
+    sensors = plain.sensors
+    noise = {name: getattr(sensors, name).noise for name in ("theta", "theta_dot", "z_ddot", "tau_m")}
+    assert noise == {"theta": 1e-3, "theta_dot": 0.01, "z_ddot": 0.01, "tau_m": 2e-3}
+    assert (sensors.grip_force, sensors.dropout) == (None, ())
+    seated: Any = load(MINIMAL.replace("[pilot]", '[pilot]\nmodel = "two_dof"')).pilot
+    assert [each.value for each in (seated.m_t, seated.c_t, seated.k_t)] == [45.0, 1000.0, 36000.0]
+    reflex = MINIMAL.replace("[pilot]", '[pilot]\nmodel = "reflex"\nk_r = "300 N/m"\nc_r = "10 N s/m"')
+    pilot: Any = load(reflex).pilot
+    assert pilot.delay == 0.035
+
+
+def test_hands_are_those_of_mayo() -> None:
+    """J. R. Mayo, The involuntary participation of a human pilot in a helicopter collective control loop (1989)."""
+    assert {name: (hand.damping, hand.lead, hand.stiffness) for name, hand in mayo_plant.HANDS.items()} == {
+        "ectomorphic": (13.70, 5.19, 452.3),
+        "mesomorphic": (13.31, 4.02, 555.4),
+    }
+    assert mayo_plant.HANDS["ectomorphic"].outside == pytest.approx(8.51)

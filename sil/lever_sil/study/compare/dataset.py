@@ -93,7 +93,7 @@ def read(folder: Path, name: str) -> Batch:
         key: np.array(value) if isinstance(value, list) else value for key, value in known["knowledge"].items()
     }
     parameters = [f"true_{each}" for each in KINDS[known["model"]].parameters]
-    has_parameters = set(parameters) <= set(table.column_names)
+    has_parameters = parameters[0] in table.column_names
     truth = Truth(columns(*_TRUE[:2]), columns(*parameters) if has_parameters else None, columns(*_TRUE[2:]))
     settings, signals = Config().settings | known["settings"], (columns(*_MEASURED[:2]), columns(*_MEASURED[2:]))
     return measured(settings, known["model"], known["preload"], signals, truth, Knowledge(**own))
