@@ -209,7 +209,7 @@ def test_what_a_scenario_does_not_say_is_as_the_readme_has_it(load: Load) -> Non
 
 
 def test_hands_are_those_of_mayo() -> None:
-    """J. R. Mayo, The involuntary participation of a human pilot in a helicopter collective control loop (1989)."""
+    """R. Mayo, The involuntary participation of a human pilot in a helicopter collective control loop (1989)."""
     assert {name: (hand.damping, hand.lead, hand.stiffness) for name, hand in mayo_plant.HANDS.items()} == {
         "ectomorphic": (13.70, 5.19, 452.3),
         "mesomorphic": (13.31, 4.02, 555.4),
