@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from lever_cdkf.errors import LeverError
 from lever_cdkf.firmware.aircraft import ALARM, WARNING
+from lever_cdkf.numeric.arrays import ComplexArray
 from lever_sil.aircraft import aircraft, stability
 from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.aircraft.response_table import alarm_limit, known_response, response_table
@@ -82,12 +83,12 @@ def test_what_grows_does_not_fly(pole: float, flies: bool) -> None:
 
 
 def test_a_fit_has_as_few_poles_as_are_good_to_half_a_percent_and_sixteen_at_most() -> None:
-    s = 2j * np.pi * np.geomspace(1.0, 10.0, 60)
-    one = 50.0 / (s**2 + 4.0 * s + 400.0)
+    s = (2j * np.pi * np.geomspace(1.0, 10.0, 60)).astype(np.complex128)
+    one: ComplexArray = 50.0 / (s**2 + 4.0 * s + 400.0)
     assert len(fit(s, one).system.a) == 2
-    ripple = one * (1.0 + 0.003 * np.cos(40.0 * np.log(np.abs(s))))
+    ripple: ComplexArray = one * (1.0 + 0.003 * np.cos(40.0 * np.log(np.abs(s))))
     assert len(fit(s, ripple).system.a) == 2, "it is good enough"
-    noisy = one * (1.0 + 0.05 * np.random.default_rng(1).standard_normal(60))
+    noisy: ComplexArray = one * (1.0 + 0.05 * np.random.default_rng(1).standard_normal(60))
     assert 2 < len(fit(s, noisy).system.a) <= 16
     assert len(fit(s, noisy, 1).system.a) == 2
 

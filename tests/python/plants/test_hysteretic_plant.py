@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from lever_sil.plants.hysteretic_plant import REFERENCE, Hysteretic
+from lever_sil.plants.hysteretic_plant import Hysteretic
 from python.plants.motion import LEVER, TRIM, columns
 
 RISE = 0.45 * math.cos(TRIM)
@@ -22,4 +22,4 @@ def test_its_stiffness_is_a_power_of_frequency_with_a_constant_loss_factor(loss_
     stiffness = (-RISE * (0.6 + 3.2) / answer - MASS * s**2 - 0.5 * s - 5.0) / RISE**2
     assert stiffness.imag / stiffness.real == pytest.approx(loss_factor, rel=0.013)
     power = 2 / math.pi * math.atan(loss_factor)
-    assert stiffness.real == pytest.approx(2100.0 * (frequency / REFERENCE) ** power, rel=0.005)
+    assert stiffness.real == pytest.approx(2100.0 * (frequency / 4.0) ** power, rel=0.005)

@@ -12,7 +12,7 @@ import pytest
 from lever_cdkf.numeric.arrays import FloatArray
 from lever_sil.plants import lever_plant
 from lever_sil.plants.hysteretic_plant import Hysteretic
-from lever_sil.plants.lever_plant import STOP_RATE, Lever, LeverTruth
+from lever_sil.plants.lever_plant import Lever, LeverTruth
 from lever_sil.plants.linear_plant import BlackBox, Physical
 from lever_sil.plants.mayo_plant import HANDS, Mayo
 from lever_sil.plants.reflex_plant import Reflex
@@ -123,7 +123,7 @@ def test_motion_with_friction_is_that_of_a_stiff_solver() -> None:
     push = 0.5 * np.sin(2 * math.pi * 1.5 * time)
 
     def derivative(now: float, x: FloatArray) -> list[float]:
-        friction = 0.3 * x[1] / math.sqrt(x[1] ** 2 + STOP_RATE**2)
+        friction = 0.3 * x[1] / math.sqrt(x[1] ** 2 + 0.002**2)
         torque = np.interp(now, time, push) - friction - 0.5 * x[1] - 5.0 * x[0]
         return [x[1], torque / lever.own_inertia]
 
