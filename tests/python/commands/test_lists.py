@@ -32,13 +32,24 @@ HEADINGS: dict[str, dict[str, tuple[str, ...]]] = {
 }
 
 
+Tables = dict[str, list[dict[str, Any]]]
+_listed: dict[str, tuple[Tables, str]] = {}
+
+
+def listed(command: str, lever: Run, folder: Path) -> tuple[Tables, str]:
+    """Return the tables of a list as JSON, and what is printed; each is listed once."""
+    if command not in _listed:
+        status, printed, error = lever(*command.split(), "--list", "--json", folder / "list.json")
+        assert (status, error) == (0, "")
+        tables = json.loads((folder / "list.json").read_text(encoding="utf-8"))
+        tables.pop("provenance", None)
+        _listed[command] = tables, printed
+    return _listed[command]
+
+
 @pytest.mark.parametrize("command", HEADINGS)
 def test_a_list_has_its_headings(command: str, lever: Run, tmp_path: Path) -> None:
-    file = tmp_path / "list.json"
-    status, printed, error = lever(*command.split(), "--list", "--json", file)
-    assert (status, error) == (0, "")
-    tables = json.loads(file.read_text(encoding="utf-8"))
-    tables.pop("provenance", None)
+    tables, printed = listed(command, lever, tmp_path)
     assert {title: {tuple(row) for row in rows} for title, rows in tables.items()} == {
         title: {names} for title, names in HEADINGS[command].items()
     }
@@ -49,9 +60,7 @@ def test_a_list_has_its_headings(command: str, lever: Run, tmp_path: Path) -> No
 
 def test_a_list_says_of_each_what_it_is(lever: Run, tmp_path: Path) -> None:
     def rows(command: str, title: str) -> dict[str, dict[str, Any]]:
-        assert lever(*command.split(), "--list", "--json", tmp_path / "list.json")[0] == 0
-        found = json.loads((tmp_path / "list.json").read_text(encoding="utf-8"))[title]
-        return {next(iter(row.values())): row for row in found}
+        return {next(iter(row.values())): row for row in listed(command, lever, tmp_path)[0][title]}
 
     steady = rows("sim", "scenarios")["steady"]
     assert (steady["duration [s]"], steady["title"]) == (60.0, scenario.load("steady").title)

@@ -99,10 +99,10 @@ def test_the_page_links_what_is_not_met_and_says_why_where_that_is_known() -> No
 
 def test_of_many_faults_only_those_have_a_chart_that_are_not_met() -> None:
     many = [result(f"kept_{i}", verdict()) for i in range(12)]
-    assert len(figures(Reader(faults_page.build(many, 1)))) == 12
+    good = Reader(faults_page.build(many, 1))
+    assert len(figures(good)) == 12
     page = Reader(faults_page.build([*many, BROKEN], 1))
     assert list(figures(page)) == ["chart-broken"]
-    good = Reader(faults_page.build(many, 1))
     assert ("p", {"class": "verdict good"}) in good.tags
     assert "Not met" not in "".join(good.text)
     assert ("p", {"class": "verdict watch"}) in Reader(faults_page.build([LIMITED], 1)).tags
