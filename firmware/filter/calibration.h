@@ -7,7 +7,8 @@
 #include "filter/cdkf.h"
 
 typedef struct calibration {
-    score_t score[CDKF_CALIBRATION]; /* with exponential forgetting */
+    score_t score[CDKF_CALIBRATION]; /* with exponential forgetting over 20 s, */
+    score_t now[CDKF_CALIBRATION];   /* and over 0.5 s, which an error that is large does not wait for */
 } calibration_t;
 
 void calibration_start(calibration_t *calibration);

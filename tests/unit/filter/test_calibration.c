@@ -64,6 +64,14 @@ TEST(a_larger_one_is_found_for_each_error_and_sign_and_again_within_when_it_is_g
     }
 }
 
+/* As soon as half a second tells it, whatever was known before, and over as soon. */
+TEST(a_large_one_is_found_and_over_within_seconds)
+{
+    (void)run(3000u, CDKF_BASE_DELAY, 0.0, 100.0);
+    TEST_ASSERT_GREATER_THAN_UINT32(150u, run(200u, CDKF_BASE_DELAY, 6.0, 100.0)); /* 4 s, found within 1 s */
+    TEST_ASSERT_TRUE(is_wrong);
+}
+
 /* Long after the last torque its high-passed rest is so small that its square, the information, is 0 in float. */
 TEST(nothing_is_found_where_the_information_has_underflowed)
 {
