@@ -75,7 +75,7 @@ def read(
     if reading.channel is None and traffic.other_samples:
         buses = " or --channel ".join(sorted({str(traffic.channel), *traffic.other_samples}))
         raise LeverError(f"{name}: samples on more than one bus: choose by --channel {buses}")
-    notes = list(filter(None, [incomplete(log.ends_early)]))
+    notes = [incomplete(log.ends_early)] if log.ends_early else []
     notes += traffic.loaded.notes if isinstance(traffic, MappedFrames) else ()
     return replace(_recording(np.concatenate(pieces), str(traffic.channel), name), notes=tuple(notes))
 

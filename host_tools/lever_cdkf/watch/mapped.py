@@ -26,7 +26,7 @@ class MappedLog:
         self._estimator = Estimator(self._traffic.at_its_rate(config))
         self._estimator.watch(aircraft)
         self.notes = self._traffic.loaded.notes
-        """What was guessed or is odd, a sentence each."""
+        """One sentence for each guess or oddity."""
         self.damaged, self.ends_early = self._traffic.recording.damaged, self._traffic.recording.ends_early
 
     def chunks(self) -> Iterator[Frames]:

@@ -68,6 +68,7 @@ def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run `lever aircraft`; return the exit status."""
+    from lever_cdkf.cli.layout import warn
     from lever_cdkf.cli.tables import print_tables
     from lever_cdkf.errors import LeverError
     from lever_cdkf.runtime.files import write_text
@@ -92,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     except LeverError as error:
         if args.export is not None:
             raise
-        print(f"lever: warning: {error}", file=sys.stderr)  # the table is what was measured
+        warn(str(error))  # the table is what was measured
     if args.export is not None:
         _flown(name, _of_aircraft(changes)).aircraft.airframe().write(args.export, provenance().comment())
     if args.out is not None:

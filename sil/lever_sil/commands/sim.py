@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from lever_cdkf.can import buses
 from lever_cdkf.can.buses import add_bus_options, chosen_options
 from lever_cdkf.cli.formats import FORMATS, add_format_option, chosen_formats
-from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.layout import say, warn
 from lever_cdkf.cli.tables import Row, Tables, add_json_option
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
@@ -231,7 +231,7 @@ def _list(json_file: str | None) -> int:
         try:
             scenario = load(name)
         except LeverError as error:  # one of the user's: the others are listed
-            print(f"lever: warning: left out: {error}", file=sys.stderr)
+            warn(f"left out: {error}")
             continue
         rows.append({"name": scenario.name, "duration [s]": scenario.duration, "title": scenario.title})
     print_tables({"scenarios": rows}, json_file)

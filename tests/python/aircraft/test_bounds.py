@@ -1,4 +1,4 @@
-"""What the firmware is told of an aircraft where nothing else is said, and what is just good enough to fly."""
+"""Tests of the defaults that the firmware gets for an aircraft, and of the limits within which an aircraft flies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is flown in each condition of `lever bounce`, and its limits: as required, so that none moves unnoticed."""
+"""Each condition of `lever bounce` flies what is required and has the limits that are required."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ MOVES = {
 ALONE, IN_FLIGHT = MOVES | {"gearing": 1e-9}, MOVES | {"gearing": 0.5}
 UNTOUCHED = "gain changed worst ≤ 1, phase changed worst ≤ 2"
 SOUGHT = {"gearing": 1.5**7 * 0.5, "raised_from": 0.5}
-"""Of a search in which no flight is loud."""
+"""The gearing at which a search ends in which no flight is loud."""
 TO_ZERO = "to zero worst ≤ 0.1, jump worst ≤ 0.2"
 REQUIRED: Mapping[str, tuple[Mapping[str, Any], str, str]] = {
     **{
@@ -221,8 +221,8 @@ REQUIRED: Mapping[str, tuple[Mapping[str, Any], str, str]] = {
         "cancellation",
     ),
 }
-"""What differs from 60 s with a slack pilot in the last flight, where the critical gearing is 1; the limits; and its
-mitigation, of the others for those that are compared with a flight without."""
+"""Each entry has what differs from 60 s with a slack pilot in the last flight, where the critical gearing is 1; the
+limits; and its mitigation, of the others for those that are compared with a flight without."""
 
 
 def stub(plan: Plan) -> SimpleNamespace:

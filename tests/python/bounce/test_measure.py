@@ -1,4 +1,4 @@
-"""What is measured in a flight of `lever bounce`, on flights that are made up."""
+"""The measures of `lever bounce` are tested on flights that are made up."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is mapped of a campaign, in which unit and between which limits, and how a border is told."""
+"""The maps of a campaign show the right quantities, with their units and limits, and say where a border is."""
 
 from __future__ import annotations
 

@@ -261,7 +261,7 @@ def test_foreign_frames_without_end_take_no_memory(session: Session, tmp_path: P
 
 @pytest.mark.parametrize("length", [bulk.LONGEST_LINE, bulk.LONGEST_LINE + 1, 5 * bulk.LONGEST_LINE])
 def test_a_line_that_is_too_long_is_one_line(length: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever the blocks are, and all after it is read."""
+    """It is so for blocks of any size, and the lines after it are read."""
     log = tmp_path / "long.log"
     log.write_text("(1.0) can0 123#00\n" + "x" * length + "\n(2.0) can0 124#00\n")
     for block in (bulk.LONGEST_LINE // 2, bulk.LONGEST_LINE, 1 << 20):

@@ -127,33 +127,6 @@ def test_encodings(tmp_path: Path) -> None:
 # --- numbers ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("text_", "unit", "value"),
-    [("1.5 mm", "m", 1.5e-3), ("-2e3 mrad", "rad", -2.0), (".5 s", "s", 0.5), ("3.", "1", 3.0), ("2 %", "1", 0.02),
-     (0.25, "1", 0.25), (" 4  g ", "m/s^2", 4.0 * 9.80665), ("60 rpm", "Hz", 1.0), ("60 rpm", "rad/s", 2.0 * math.pi),
-     ("90 deg", "rad", math.pi / 2.0), ("2 h", "s", 7200.0), ("1 %/sqrt(s)", "1/sqrt(s)", 0.01)],
-)  # fmt: skip
-def test_quantities_in_si(text_: str | float, unit: str, value: float) -> None:
-    assert units.parse(text_, unit) == pytest.approx(value, rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "unit", "said"),
-    [
-        ("1.5", "m", "'1.5' has no unit; allowed: m, cm, mm"),
-        ("1 kg", "m", "'1 kg' has unit 'kg'; allowed: m, cm, mm"),
-        ("x", "m", "'x' is not a quantity; write a number and a unit in quotes, like \"1.5 m\""),
-        (2.0, "m", "2.0 is not a quantity"),
-        (True, "1", "True is not a quantity"),
-        ("1e400 m", "m", "'1e400 m' is too large"),
-    ],
-)
-def test_what_is_no_quantity(wrong: object, unit: str, said: str) -> None:
-    with pytest.raises(units.UnitError) as error:
-        units.parse(wrong, unit)
-    assert str(error.value).startswith(said)
-
-
 def test_numbers_without_a_unit() -> None:
     assert [units.number_of(each) for each in ("1.5", "-2e-3", " 7 ")] == [1.5, -2e-3, 7.0]
     assert all(math.isnan(units.number_of(each)) for each in ("1 m", "x", "", "1e400", "nan", "inf"))

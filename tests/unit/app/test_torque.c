@@ -218,8 +218,8 @@ TEST(no_command_brings_torque_back_in_fault)
 
 /* --- evidence that it does harm ------------------------------------------------------------------------------------ */
 
-/* Samples with a motor that does so many times what it is asked, and a sensor that says so many times what it does, kept
- * alive; until the gate is as it is to be. Returns how many. */
+/* Samples with a motor that does so many times what it is asked, and a sensor that says so many times what it does,
+ * kept alive; until the gate is as it is to be. Returns how many. */
 static uint32_t fly_sensed_motor(float gain, float sensed, bool valid, bool open, uint32_t most)
 {
     uint32_t k = 0u;
