@@ -131,10 +131,10 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance: 2,448 bytes, and as much more as pointers are longer than 32 bits. */
+/* Room for one instance: 2,464 bytes, and as much more as pointers are longer than 32 bits. */
 typedef struct lever_room {
     const void *pointers[4];
-    uint8_t rest[2432];
+    uint8_t rest[2448];
 } lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
@@ -325,7 +325,7 @@ void lever_correction(const lever_t *lever, lever_correction_t *correction);
 
 /* --- evidence --------------------------------------------------------------------------------------------------- */
 
-enum lever_evidence_limits { LEVER_TEST_RATIOS = 14 };
+enum lever_evidence_limits { LEVER_TEST_RATIOS = 16 };
 
 /* The test ratio of each statistic that is watched for faults and changes: its value over its threshold, as at the end
  * of the last learn_period. Above 1 it is evidence, until it falls below a second threshold. The order is that of
@@ -361,7 +361,7 @@ enum lever_fault {
     LEVER_FAULT_DUPLICATE = 8192,   /* another estimator has spoken on this bus within the last 2 s */
     LEVER_FAULT_SETTLING = 16384,   /* nothing is learnt: the levels of the signals have not settled yet */
     LEVER_FAULT_MISMATCH = 32768,   /* innovations are not white, or the lever sticks: something that the model lacks */
-    LEVER_FAULT_CALIBRATION = 65536, /* the measured inputs do not agree on the pilot: one is wrong or wrongly scaled */
+    LEVER_FAULT_CALIBRATION = 65536, /* the inputs, or their times, do not agree: one is wrong or wrongly scaled */
     LEVER_FAULT_HANDS_OFF = 131072   /* nobody holds the lever; nothing is learnt */
 };
 
@@ -481,7 +481,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 2146 };
+enum lever_state_limits { LEVER_STATE_BYTES = 2160 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

@@ -307,6 +307,7 @@ static void advance(estimator_t *estimator, checked_t *sample, const inputs_t *l
 static void step(estimator_t *estimator, checked_t *sample, const inputs_t *last, float elapsed)
 {
     const uint32_t periods = periods_in(estimator, elapsed);
+    estimator->learning.evidence.periods += periods;
     estimator->trim.unsettled -= elapsed; /* before this sample may set it */
     note(estimator, elapsed < (CLOCK_MIN * estimator->setup.settings->sample_period), LEVER_FAULT_CLOCK);
     if (periods > 1u) {

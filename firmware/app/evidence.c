@@ -30,6 +30,7 @@
 #define KINEMATICS_BLOCK 0.02f  /* more often than this the sums hardly get new information [s] */
 #define KINEMATICS_BLOCKS 6.0f  /* from which on the gain has a standard deviation */
 #define KINEMATICS_SURE 2.0f    /* standard deviations that the gain may be off */
+#define CLOCK_MEMORY 0.25f      /* [s] */
 #define LEVEL_SHARE 0.02f       /* of a torque's level, by one sample in EVIDENCE_TORQUE_EVERY */
 #define OTHER_SHARE 0.01f       /* of its mean, by one sample in EVIDENCE_TORQUE_EVERY */
 #define OTHER_LEAST 2.5e-3f     /* mean square that is more than noise of the sensor [N^2 m^2] */
@@ -268,8 +269,19 @@ static void judge_motor(evidence_t *evidence, float period, float sample_period)
 {
     const float least = TORQUE_MIN * (AGREEMENT_MEMORY / ((float)EVIDENCE_TORQUE_EVERY * sample_period));
     const bool says = (evidence->torque.expected > least);
-    evidence_set(evidence, EVIDENCE_MOTOR, says ? agreement_away(&evidence->torque, TORQUE_SURE) : 0.0f);
+    const float away = says ? agreement_away(&evidence->torque, TORQUE_SURE) : 0.0f;
+    evidence_set(evidence, EVIDENCE_MOTOR, away);
+    evidence_set(evidence, EVIDENCE_TORQUE_GAIN, away);
     agreement_forget(&evidence->torque, 1.0f - share_of(period, AGREEMENT_MEMORY));
+}
+
+/* Lost samples count as so many periods: what is left is the clock. */
+static void judge_clock(evidence_t *evidence, float period, float sample_period)
+{
+    const float error = (period / (sample_period * (float)evidence->periods)) - 1.0f;
+    evidence->clock += share_of(period, CLOCK_MEMORY) * (error - evidence->clock);
+    evidence->periods = 0u;
+    evidence_set(evidence, EVIDENCE_CLOCK, fabsf(evidence->clock));
 }
 
 /* Compares the angle with the integral of the rate. The gain's standard deviation is what else differs, over the root
@@ -360,6 +372,7 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     }
     judge_motor(evidence, period, setup->settings->sample_period);
     judge_kinematics(evidence, period, setup->settings->sample_period);
+    judge_clock(evidence, period, setup->settings->sample_period);
     if ((block->known || block->held) && !evidence_has(evidence, EVIDENCE_HANDS) &&
         !evidence_has(evidence, EVIDENCE_KINEMATICS)) { /* what does not agree says nothing of the base */
         judge_base(evidence, &sudden, period);
@@ -424,4 +437,5 @@ void evidence_resume(evidence_t *evidence)
 {
     trust_base(evidence);
     whiteness_start(&evidence->whiteness);
+    evidence->periods = 0u;
 }

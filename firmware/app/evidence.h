@@ -6,6 +6,7 @@
  *   base     the response to the base acceleration is not about once what it should be: no sensor, the wrong sign, the
  *            wrong unit. By the score of a sudden error of the accelerometer's gain (filter/cdkf.h)
  *   motor    the measured torque does not follow the commanded one. By regression; other torque makes it less sure
+ *   clock    samples are further apart, or closer, than sample_period: their sender's clock is wrong, or the setting
  *   kinematics  the angle is not the integral of the rate, whatever the arm. By the same regression
  *   motion   the mean square of the measured rate without the noise of its sensor
  */
@@ -82,6 +83,7 @@ typedef struct evidence {
     float commanded_level;
     float measured_level;
     float other_torque; /* mean square of what the motor was not asked for, while it was measured [N^2 m^2] */
+    float clock;        /* time between samples over sample_period, less 1, with exponential forgetting */
     kinematics_t kinematics;
     change_detection_t change;
     whiteness_t whiteness;
@@ -89,6 +91,7 @@ typedef struct evidence {
     calibration_t calibration;
     hands_t hands;
     grip_force_t force;
+    uint32_t periods;        /* of samples, lost ones too, in this block */
     bool seen[SIGNAL_COUNT]; /* in this block */
     bool paired;             /* the last sample measured both outputs */
     bool opened;             /* the last change was to another pilot */

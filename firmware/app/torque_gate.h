@@ -52,7 +52,7 @@ typedef struct torque_sample {
     bool advances;       /* it does */
     bool measured;       /* theta or theta_dot is valid */
     bool permitted;      /* mode RUN or FROZEN (or COAST, which `measured` ends), no fault of the machine */
-    bool harmful;        /* what the verdict forbids torque for */
+    bool harmful;        /* the verdict forbids torque */
 } torque_sample_t;
 
 /* Closed. */

@@ -43,6 +43,8 @@ STATISTICS = (
     Statistic("calibration", 0.75, CALIBRATION),
     Statistic("force", -1.0, CALIBRATION),
     Statistic("kinematics", 0.5, THETA | THETA_DOT),
+    Statistic("torque_gain", 0.7, CALIBRATION),
+    Statistic("clock", 0.6, CALIBRATION),
 )
 APART = (5, 7)  # base, see shows_base(), and change, which is present from 0.29 s after one on
 INDEX = {statistic.name: index for index, statistic in enumerate(STATISTICS)}

@@ -45,6 +45,8 @@ _LOST: dict[str, tuple[str, ...]] = {"LEVER_SAMPLE": ("THETA",), "BASE_SAMPLE": 
 """What says that a message is missing; a sensor of the grip force is optional."""
 _STUCK, _WRONG = 500, 2000
 """A signal that is stuck, or a base acceleration that does not fit, is flagged within so many samples: R32, R33."""
+_RATE = 500
+"""A sample clock at another rate than the setting: R30."""
 _ALIGNED, _JUDGED = 300, 1200
 """Samples until ALIGN ends after power-on, and until the levels have settled."""
 _GRIP_WRONG = 10_000
@@ -295,6 +297,8 @@ def _readings() -> Iterator[Row]:
             "gain_drift": ("gain going to 1.5", Scale(factor=1.5, over=_LASTS), Requirement()),
             "spikes": ("1 % of the values far off", spikes, _SPIKES.get(signal, Requirement())),
         }
+        if signal == "tau_m":
+            faults["gain_0.7"] = ("0.7 of what it is", Scale(factor=0.7), Requirement(("CALIBRATION",), _WRONG))
         for name, (title, fault, requirement) in faults.items():
             quick = (signal, name) in (("theta", "stuck"), ("z_ddot", "sign"), ("tau_m", "invalid"))
             yield Row(
@@ -315,10 +319,10 @@ def _clocks() -> Iterator[Row]:
     yield Row("clock_stands", "the sender's clock stands", stands, on_readings=clock(lambda t: 0.0 * t), quick=True)
     yield Row("clock_back", "the sender's clock runs backwards", stands, on_readings=clock(lambda t: -t))
     yield Row("clock_crawls", "the sender's clock runs at a tenth", stands, on_readings=clock(lambda t: 0.1 * t))
-    yield Row(
-        "clock_half", "the sender's clock runs at half its rate", Requirement(), on_readings=clock(lambda t: 0.5 * t)
-    )
-    yield Row("clock_1.1", "the sender's clock is 10 % fast", Requirement(), on_readings=clock(lambda t: 1.1 * t))
+    rate = Requirement(("CALIBRATION",), _RATE)
+    yield Row("clock_half", "the sender's clock runs at half its rate", rate, on_readings=clock(lambda t: 0.5 * t))
+    yield Row("clock_0.9", "the sender's clock is 10 % slow", rate, on_readings=clock(lambda t: 0.9 * t))
+    yield Row("clock_1.1", "the sender's clock is 10 % fast", rate, on_readings=clock(lambda t: 1.1 * t))
     yield Row(
         "clock_2",
         "the sender's clock is twice as fast",
@@ -405,7 +409,6 @@ _TORQUE = "takes a second: a shorter memory takes other torque of a frequency ne
 _BASE = "without torque a gain of z̈ is a scale of the arm, which no innovation tells from it; dither tells in seconds"
 _LEVELS = "its levels are off by the whole angle when it is right again: BASE and INNOVATION go after up to 3.6 s"
 _RATE_ALONE = "learnt from the rate alone, some pilots' arm is off by over 3 sigma for 2 s after the angle is back"
-_CLOCK = "angle and rate tell in 0.5 to 4 s that it is 10 % fast, and until then it is that of another arm"
 _TRIM = "f_n is that at the angle shown, which drifts off, and k_p that is held does not make up for it"
 KNOWN: dict[str, str] = {
     "lever_stale": "angle and rate that stand together are those of a lever at rest; BASE shows after 0.8 s",
@@ -419,6 +422,7 @@ KNOWN: dict[str, str] = {
     "theta_dot_gain_double": _LEVELS,
     "tau_m_stuck": _TORQUE,
     "tau_m_zero": _TORQUE,
+    "tau_m_gain_0.7": "what was learnt with it is off, and unflagged, for up to 2 s after it is right again",
     "theta_dot_step": _OFFSET,
     "z_ddot_step": _OFFSET,
     "z_ddot_drift": _OFFSET,
@@ -430,7 +434,6 @@ KNOWN: dict[str, str] = {
     "grip_force_saturated": "a constant force passes no high-pass: it counts as none",
     "grip_force_gain_half": "CALIBRATION shows a gain that is too large sooner than one that is too small",
     "babble_1": "one random frame in 256 has a right CRC and is taken; COMMUNICATION shows, but flags no estimate",
-    "clock_1.1": _CLOCK,
 }
 KNOWN |= {
     name: KNOWN[name.removesuffix(FROZEN)]

@@ -55,7 +55,7 @@ REQUIRED: dict[str, Iterable[str]] = {
         *rows("tau_m", "step drift gain_drift spikes"),
         *rows("z_ddot", "step drift gain_half gain_double gain_drift spikes"),
         *rows("grip_force", "invalid not_available step drift gain_drift spikes"),
-        *rows("clock", "half 1.1 wraps"),
+        "clock_wraps",
     ],
     "mode run or coast": rows("grip", "lost_1 lost_5 lost_10 lost_20 lost_50"),
     "mode run or frozen": ["freeze_switched"],
@@ -68,6 +68,8 @@ REQUIRED: dict[str, Iterable[str]] = {
     "GAP within 2 samples, mode run": ["clock_2"],
     "GAP within 1 sample, mode run or align": rows("clock", "jumps_0.1s jumps_1s"),
     "CLOCK within 1 sample, mode run or align": rows("clock", "jumps_1h jumps_back_0.1s jumps_back_10s"),
+    "CALIBRATION within 500 samples, mode run": rows("clock", "half 0.9 1.1"),
+    "CALIBRATION within 2000 samples, mode run": ["tau_m_gain_0.7"],
     STANDS: ["base_stale", *rows("clock", "stands back crawls")],
     "CALIBRATION within 10000 samples, mode run": [
         "grip_stale",

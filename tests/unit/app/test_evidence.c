@@ -44,6 +44,7 @@ static void surprise(double ratio, uint32_t samples)
 /* The end of a block of an arm that is known. */
 static void end_block(void)
 {
+    evidence.periods += (uint32_t)SAMPLES;
     const evidence_block_t block = {
         .setup = &setup, .period = (float)SAMPLES * PERIOD, .known = true, .verdict = (uint8_t)VERDICT_REST};
     evidence_end_block(&evidence, &cdkf, &block);
@@ -475,6 +476,67 @@ TEST(a_torque_that_follows_again_is_right_and_without_dither_nothing_is_said)
         (void)torque_wrong_after(0.0, 0.0, 0.2);
     }
     TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_MOTOR));
+}
+
+/* A measured torque, or a motor, that is off by less than makes the verdict. */
+/* R33 */
+TEST(a_gain_of_the_torque_that_is_off_by_a_fifth_shows_within_two_seconds)
+{
+    static const struct {
+        double gain;
+        double other;
+        bool shown;
+    } row[] = {{1.0, 0.0, false}, {0.7, 0.0, true}, {0.8, 0.0, true}, {0.88, 0.0, false}, {1.25, 0.0, true},
+        {1.12, 0.0, false}, {0.8, 0.3, false}};
+    for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
+        setUp();
+        (void)torque_wrong_after(0.3, 1.0, 0.0);
+        TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_TORQUE_GAIN));
+        TEST_ASSERT_EQUAL_UINT32(0u, torque_wrong_after(0.3, row[i].gain, row[i].other));
+        evidence_show(&evidence);
+        TEST_ASSERT_EQUAL(row[i].shown, evidence_has(&evidence, EVIDENCE_TORQUE_GAIN));
+        TEST_ASSERT_EQUAL_HEX32(row[i].shown ? LEVER_FAULT_CALIBRATION : 0u, evidence.faults);
+    }
+}
+
+/* --- the clock ---------------------------------------------------------------------------------------------------- */
+
+/* Blocks of so many sample periods that take so much time, until the evidence of the clock is as wanted [s]. */
+static float clock_until(bool wanted, uint32_t periods, float rate)
+{
+    float time = 0.0f;
+    while ((evidence_has(&evidence, EVIDENCE_CLOCK) != wanted) && (time < 10.0f)) {
+        const evidence_block_t block = {.setup = &setup,
+            .period = rate * ((float)periods * PERIOD),
+            .known = true,
+            .verdict = (uint8_t)VERDICT_REST};
+        evidence.periods = periods;
+        evidence_end_block(&evidence, &cdkf, &block);
+        TEST_ASSERT_EQUAL_UINT32(0u, evidence.periods);
+        time += block.period;
+    }
+    return time;
+}
+
+/* Blocks may be of any length. 5 % are allowed; of 7 % the mean over 0.25 s is 5 after 0.25 ln 3.5 = 0.31 s. */
+/* R30 */
+TEST(a_clock_at_another_rate_shows_within_half_a_second)
+{
+    static const float right[] = {0.96f, 1.0f, 1.04f};
+    static const float wrong[] = {0.5f, 0.9f, 0.93f, 1.07f, 1.1f, 1.4f};
+    static const uint32_t periods[] = {1u, 20u, 100u};
+    for (uint32_t k = 0u; k < (sizeof periods / sizeof periods[0]); k++) {
+        for (uint32_t i = 0u; i < (sizeof right / sizeof right[0]); i++) {
+            setUp();
+            TEST_ASSERT_TRUE(clock_until(true, periods[k], right[i]) >= 10.0f);
+        }
+        for (uint32_t i = 0u; i < (sizeof wrong / sizeof wrong[0]); i++) {
+            TEST_ASSERT_TRUE(clock_until(true, periods[k], wrong[i]) < 0.5f);
+            evidence_show(&evidence);
+            TEST_ASSERT_EQUAL_HEX32(LEVER_FAULT_CALIBRATION, evidence.faults);
+            TEST_ASSERT_TRUE(clock_until(false, periods[k], 1.0f) < 1.0f);
+        }
+    }
 }
 
 /* What a motor does is compared with its command 3 ms ago, as a lag of first order: after 3 ms 1 - 1/e of a step, by

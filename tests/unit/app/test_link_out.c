@@ -395,7 +395,7 @@ TEST(test_ratios_are_sent_in_turn)
     evidence->present = 1u << (uint32_t)EVIDENCE_HANDS;
     lever_test_ratios(lever, ratio);
     TEST_ASSERT_EQUAL_STRING("MOTOR", lever_test_ratio_name(0u));
-    TEST_ASSERT_EQUAL_STRING("KINEMATICS", lever_test_ratio_name((uint32_t)LEVER_TEST_RATIOS - 1u));
+    TEST_ASSERT_EQUAL_STRING("CLOCK", lever_test_ratio_name((uint32_t)LEVER_TEST_RATIOS - 1u));
     TEST_ASSERT_NULL(lever_test_ratio_name((uint32_t)LEVER_TEST_RATIOS));
     TEST_ASSERT_EQUAL_FLOAT_ARRAY(evidence->ratio, ratio, LEVER_TEST_RATIOS);
     for (uint32_t i = 0u; i <= (uint32_t)LEVER_TEST_RATIOS; i++) {

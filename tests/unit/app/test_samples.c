@@ -176,6 +176,45 @@ static enum lever_mode run_lagging(uint32_t count, uint32_t lag_us)
     return mode;
 }
 
+/* So many samples of which each takes `more_us` longer than it should, one in `lost` does not come (0: all do), and one
+ * signal is invalid (SIGNALS: none). Returns whether CALIBRATION shows. */
+static bool run_slower(uint32_t count, uint32_t more_us, uint32_t lost, uint32_t without)
+{
+    for (uint32_t k = 1u; k <= count; k++) {
+        lever_sample_t sample = sample_after(1u);
+        time_us += more_us;
+        sample.time_us = time_us;
+        if (without < (uint32_t)SIGNALS) {
+            invalidate(&sample, without);
+        }
+        if ((lost == 0u) || ((k % lost) != 0u)) {
+            (void)lever_update(lever, &sample);
+        }
+    }
+    return has_fault(LEVER_FAULT_CALIBRATION);
+}
+
+/* In ALIGN, RUN and FROZEN, whatever is missing. Lost samples alone, also half of them, are no clock. */
+/* R30 */
+TEST(a_clock_that_is_a_tenth_fast_shows_in_every_mode_and_lost_samples_do_not)
+{
+    static const uint32_t lost[] = {0u, 5u, 2u};
+    for (uint32_t i = 0u; i < (sizeof lost / sizeof lost[0]); i++) {
+        for (uint32_t without = 0u; without <= (uint32_t)SIGNALS; without++) {
+            for (uint32_t mode = 0u; mode < 3u; mode++) {
+                start();
+                (void)run((mode == 0u) ? 1u : 2000u);
+                lever_command_t command = command_none();
+                command.request = (uint8_t)((mode == 2u) ? LEVER_REQUEST_FREEZE : LEVER_REQUEST_RUN);
+                TEST_ASSERT_TRUE(lever_command(lever, &command));
+                TEST_ASSERT_FALSE(run_slower(280u, 0u, lost[i], without));
+                TEST_ASSERT_TRUE(run_slower(500u, 100u, lost[i], without));
+                TEST_ASSERT_FALSE(run_slower(1000u, 0u, lost[i], without));
+            }
+        }
+    }
+}
+
 /* A sender that restarts its clock is late for gap_limit; then the estimator aligns anew, parameters kept, and runs. */
 /* R30 */
 TEST(a_clock_that_starts_anew_is_followed_after_gap_limit)

@@ -83,7 +83,8 @@ TEST(each_item_of_evidence_makes_one_verdict_at_most)
     }
     const uint32_t shown = (1u << (uint32_t)EVIDENCE_CHANGE) | (1u << (uint32_t)EVIDENCE_INNOVATION) |
                            (1u << (uint32_t)EVIDENCE_COLOUR) | (1u << (uint32_t)EVIDENCE_CALIBRATION) |
-                           (1u << (uint32_t)EVIDENCE_FORCE) | (1u << (uint32_t)EVIDENCE_OFFSET) |
+                           (1u << (uint32_t)EVIDENCE_FORCE) | (1u << (uint32_t)EVIDENCE_TORQUE_GAIN) |
+                           (1u << (uint32_t)EVIDENCE_CLOCK) | (1u << (uint32_t)EVIDENCE_OFFSET) |
                            (1u << (uint32_t)EVIDENCE_BOUND);
     TEST_ASSERT_EQUAL_UINT32((1u << (uint32_t)EVIDENCE_COUNT) - 1u, seen | shown);
     TEST_ASSERT_EQUAL_UINT32(0u, seen & shown);
