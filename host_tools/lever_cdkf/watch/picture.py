@@ -35,7 +35,10 @@ _PATIENCE = 3.0  # [s] for an IDENTITY, which comes each second
 _PLATFORM_COUNTS = dict.fromkeys(("bus_offs", "overruns", "dropped"), 1 << 8)
 _WRAPS = fields.COUNTS | _PLATFORM_COUNTS
 # Of the others the last frame tells all.
-_EVERY = ("STATE_ESTIMATE", "FEEDTHROUGH", "MOTOR_COMMAND", "HEALTH", "PLATFORM_HEALTH", "IDENTITY", "COMMAND_ACK")
+_EVERY = (
+    *("STATE_ESTIMATE", "FEEDTHROUGH", "TEST_RATIO", "MOTOR_COMMAND", "HEALTH", "PLATFORM_HEALTH", "IDENTITY"),
+    "COMMAND_ACK",
+)
 
 
 class Estimated(NamedTuple):

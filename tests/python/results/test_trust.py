@@ -8,7 +8,7 @@ from lever_cdkf.results import trust
 
 def test_a_run_that_is_flagged_throughout_is_not_to_be_trusted() -> None:
     said = trust.warning({"calibration": 0.998, "change": 0.1}, 0.998)
-    words = "the measured inputs do not agree on the pilot: one is wrong or wrongly scaled"
+    words = "the inputs, or their times, do not agree: one is wrong or wrongly scaled"
     assert said == f"Do not trust the estimates: {words} (99.8 % of the time)."
 
 

@@ -74,6 +74,7 @@ def test_the_nearest_evidence_is_shown_where_it_is_sent(make_flight: Callable[..
     for index, ratio in picture.test_ratios().items():
         assert ratio == pytest.approx(max(list(said.values())[index], 0.0), abs=0.1)
     shown = picture.test_ratios()
+    assert sorted(shown) == list(range(len(TEST_RATIOS)))
     first = sorted(shown, key=shown.__getitem__)[-1]
     text = status.nearest_evidence(picture)
     assert text is not None
