@@ -311,9 +311,10 @@ class LogSource(Source):
         if last is None:
             what = "in the part from --start on" if self._channel is None else f"of channel {self._channel} in it"
             raise LeverError(f"{self.title}: no CAN frame {what}")
-        if self._log.damaged:
-            self.warning = f"{self.title}: {self._log.damaged} lines of it are not frames"
-        self.warning = incomplete(self._log.ends_early) or self.warning
+        damaged = f"{self.title}: {self._log.damaged} lines of it are not frames." if self._log.damaged else ""
+        sentence = incomplete(self._log.ends_early) or damaged
+        if sentence not in (self.warning or ""):
+            self.warning = f"{self.warning} {sentence}" if self.warning else sentence
 
 
 def as_frame(message: can.Message) -> Frame:

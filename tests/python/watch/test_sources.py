@@ -306,6 +306,17 @@ def test_a_log_that_breaks_off_is_shown_as_far_as_it_goes(tmp_path: Path) -> Non
     assert source.warning.endswith("truncated.log: its last line has no end.")
 
 
+def test_that_a_log_breaks_off_is_said_once_beside_what_was_guessed(tmp_path: Path) -> None:
+    log = tmp_path / "cut.log"
+    log.write_text("(1.000000) can0 123#00 R\n(1.1")
+    whole = f"Guessed: degrees. The log is incomplete: {log}: its last line has no end."
+    for said in ("Guessed: degrees.", whole):
+        source = LogSource(str(log))
+        source.warning = said
+        source.read_into(Picture())
+        assert source.warning == whole
+
+
 def test_a_log_that_breaks_off_while_a_page_shows_it_is_warned_of(tmp_path: Path, lever: Run) -> None:
     log = tmp_path / "cut.log"
     log.write_text("(1.000000) can0 123#00 R\n(1.1")
