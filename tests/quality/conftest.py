@@ -72,9 +72,9 @@ def quick_campaign() -> str:
 
 @pytest.fixture(scope="session")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a few seconds of a simulation, estimates included, as candump would have recorded them."""
+    """Return a second of a simulation, estimates included, as candump would have recorded them."""
     folder = tmp_path_factory.mktemp("recording")
-    simulated(folder, 4)
+    simulated(folder, 1)
     return folder / "bus.log"
 
 
@@ -119,7 +119,7 @@ def aircraft(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def simulated(folder: Path, seconds: float) -> SimulationResult:
     """Return a run, which leaves its log in a folder."""
-    steady = scenario.load("steady", [f"duration={seconds} s", "converged_after=2 s", "limits={}"])
+    steady = scenario.load("steady", [f"duration={seconds} s", "converged_after=0.5 s", "limits={}"])
     result = simulate(steady, channel="vcan0")
     (folder / "bus.log").write_bytes(b"".join(buslog.lines(result.frames, "vcan0")))
     return result
