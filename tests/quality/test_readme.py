@@ -23,6 +23,7 @@ import pytest
 import readmes
 from lever_cdkf.cli.main import _parser
 from lever_cdkf.signals.mapping import read_mapping
+from lever_sil.study.figures.catalogue import FIGURES
 from quality import tools
 from quality.conftest import SourceTree
 
@@ -45,9 +46,12 @@ SHORTER = {
     **readmes.SHORTER,
     r"--seeds 4": "--seeds 2",
     r"lever compare --scenarios step_up": r"\g<0> --duration 3",
-    r"(lever compare .*)--seeds 20": r"\1--seeds 1 --duration 2",
+    r"(lever compare .*)--seeds 20": r"\1--seeds 1 --duration 1",
     r"(lever sim .*)--seeds 20": r"\1--seeds 1",
-    r"lever compare --paper": r"\g<0> --seeds 1 --duration 2 --estimators dual_annealing rls",
+    r"lever faults --quick": r"\g<0> --only theta_stuck",
+    r"lever figures --only grip": "lever figures --only states",
+    r"lever soak --hours 0.2": "lever soak --hours 0.05",
+    r"lever compare --paper": r"\g<0> --seeds 1 --duration 1 --estimators dual_annealing rls",
     r"lever campaign quick(?= -o)": "lever campaign quick.toml --workers 1",
     r"lever campaign quick(?= --run)": "lever campaign quick.toml",
     r'duration="1 s"': 'duration="0.5 s"',
@@ -57,8 +61,34 @@ SHORTER = {
 """The same command, with less to calculate."""
 
 
-def shorter(script: str) -> str:
-    for pattern, instead in {} if os.environ.get("LEVER_LITERAL") else SHORTER.items():
+REPLAY, FMU = "host_tools/lever_cdkf/replay/README.md", "host_tools/lever_cdkf/fmu/README.md"
+REPEATED = {
+    ("README.md", r"lever --help"): "host_tools/README.md",
+    ("README.md", r"lever settings(?=;|$)"): "host_tools/README.md",
+    ("README.md", r"lever dbc(?= |$)"): "host_tools/README.md",
+    ("README.md", r"lever monitor .*--scenario demo"): "host_tools/README.md",
+    ("README.md", r"lever sim --list"): "sil/README.md",
+    ("README.md", r"lever tune \S+/bus.log"): "sil/SIL.md",
+    ("README.md", r"lever campaign --list"): "sil/lever_sil/campaign/README.md",
+    ("README.md", r"lever fmu controller -o"): FMU,
+    ("README.md", r"lever replay \S+ --aircraft uh60_like,gearing=0.5"): REPLAY,
+    ("sil/SIL.md", r"lever sim --list"): "sil/README.md",
+    ("sil/SIL.md", r"cantools decode --single-line"): "host_tools/README.md",
+    ("host_tools/README.md", r"lever qemu \S+ --"): "firmware/port/FLASH.md",
+    ("firmware/port/README.md", r"python tests/vcan -- sh -c '[^']*'"): "sil/SIL.md",
+    ("firmware/port/README.md", r"build/lever_can --pty lever0 --lock-step(.|\n)*?kill \$!"): "README.md",
+}
+"""By page and what a command begins with: the page that has the same, with other names of files, and runs it."""
+
+
+def shorter(page: str, script: str) -> str:
+    """Return what is run of a block: all of it with LEVER_LITERAL."""
+    if os.environ.get("LEVER_LITERAL"):
+        return script
+    for where, pattern in REPEATED:
+        if where == page:
+            script = re.sub(rf"(?m){pattern}([^;#\n\\]|\\\n)*", ": ", script)
+    for pattern, instead in SHORTER.items():
         script = re.sub(pattern, instead, script)
     return script
 
@@ -77,16 +107,20 @@ BLOCKS: list[Block] = sorted(
 )
 
 
+def name(page: Path) -> str:
+    return str(page.relative_to(tools.ROOT))
+
+
 def cases(*languages: str, first: bool = True) -> list[object]:
     """Return the blocks of these languages, on the first pages or the others, as parameters."""
     return [
         pytest.param(
             block,
-            id=f"{block[0].relative_to(tools.ROOT)}:{block[1]}",
+            id=f"{name(block[0])}:{block[1]}",
             marks=[mark for words, mark in NEEDED.items() if words in block[3]],
         )
         for block in BLOCKS
-        if block[2] in languages and (str(block[0].relative_to(tools.ROOT)) in FIRST) == first
+        if block[2] in languages and (name(block[0]) in FIRST) == first
     ]
 
 
@@ -97,16 +131,16 @@ def is_run(line: str, in_readme: bool) -> bool:
 
 
 def run_here(block: Block, scratch: Path) -> None:
-    page, _, language, content = block
+    """Run a block in the current folder, `scratch`: Python in this process, which need not import all that anew."""
+    page, line, language, content = block
+    if language == "python":
+        exec(compile(content, f"{page}:{line}", "exec"), {"__name__": "__main__"})
+        return
     there = set(scratch.iterdir())
-    if language == "sh":
-        lines = "\n".join(line for line in shorter(content).splitlines() if is_run(line, page in READMES))
-        command = ["bash", "-euo", "pipefail", "-c", lines]
-    else:
-        command = [tools.python_tool("python"), "-W", "error", "-c", content]
-    tools.assert_silent(["timeout", TIME_LIMIT, *command], cwd=scratch)
+    lines = "\n".join(line for line in shorter(name(page), content).splitlines() if is_run(line, page in READMES))
+    tools.assert_silent(["timeout", TIME_LIMIT, "bash", "-euo", "pipefail", "-c", lines], cwd=scratch)
     written = {path.name for path in set(scratch.iterdir()) - there}
-    assert language != "sh" or written <= IGNORED, "what a command makes belongs into a folder that git ignores"
+    assert written <= IGNORED, "what a command makes belongs into a folder that git ignores"
 
 
 def test_whatever_a_page_has_been_built_with_makes_lever_can() -> None:
@@ -137,7 +171,7 @@ def anchors(page: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", LINKING, ids=lambda page: str(page.relative_to(tools.ROOT)))
+@pytest.mark.parametrize("page", LINKING, ids=name)
 def test_links_lead_to_files_and_headings(page: Path) -> None:
     for target, anchor in re.findall(r"\]\((?!https?:)([^)#]*)#?([^)]*)\)", page.read_text(encoding="utf-8")):
         file = page.parent / target if target else page
@@ -145,7 +179,7 @@ def test_links_lead_to_files_and_headings(page: Path) -> None:
         assert not anchor or anchor in anchors(file), f"{target}#{anchor}"
 
 
-@pytest.mark.parametrize("page", LINKING, ids=lambda page: str(page.relative_to(tools.ROOT)))
+@pytest.mark.parametrize("page", LINKING, ids=name)
 def test_what_is_not_run_says_why_and_can_be_typed(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     fences = re.findall(r"^```(.*)$", text, re.MULTILINE)[::2]
@@ -155,6 +189,11 @@ def test_what_is_not_run_says_why_and_can_be_typed(page: Path) -> None:
     for block in readmes.blocks(page, "console").values():
         for command in readmes.lever_commands(block):
             _parser().parse_args(command)
+
+
+def test_the_figure_that_the_readme_asks_for_is_one() -> None:
+    """Another is drawn, in half the time (SHORTER)."""
+    assert "grip" in FIGURES
 
 
 def test_a_mapping_file_is_one(tmp_path: Path) -> None:
@@ -169,6 +208,13 @@ def test_there_are_pages_and_every_abbreviation_is_needed() -> None:
     assert not [pattern for pattern in SHORTER if not any(re.search(pattern, block[3]) for block in BLOCKS)]
 
 
+def test_what_is_run_on_another_page_is_there() -> None:
+    scripts = {page: "\n".join(readmes.blocks(tools.ROOT / page, "sh").values()) for page in map(name, LINKING)}
+    for (page, pattern), other in REPEATED.items():
+        assert re.search(pattern, scripts[page], re.MULTILINE), pattern
+        assert re.search(pattern, shorter(other, scripts[other]), re.MULTILINE), f"{other}: {pattern}"
+
+
 @pytest.mark.parametrize("block", cases("sh", "python"))
 def test_a_block_does_what_its_page_says(block: Block, source_tree: SourceTree, request: pytest.FixtureRequest) -> None:
     """To run one that needs what others have left: -k with the name of its page."""
@@ -179,7 +225,9 @@ def run_block(block: Block, source_tree: SourceTree, request: pytest.FixtureRequ
     page, _, _, content = block
     if "build/stm32f4" in content or "lever flash" in content:
         request.getfixturevalue("slcan_image")
-    run_here(block, source_tree(str(page.relative_to(tools.ROOT)).replace("/", ".")))
+    scratch = source_tree(name(page).replace("/", "."))
+    request.getfixturevalue("monkeypatch").chdir(scratch)
+    run_here(block, scratch)
 
 
 @pytest.mark.requires("cc|gcc|clang")
