@@ -18,7 +18,7 @@ from lever_cdkf.can import codec
 from lever_cdkf.can.bus import LeverBus
 from vcan import rig
 
-SAMPLES = 250
+SAMPLES = 150
 HEALTH, IDENTITY, LINK_HEALTH = 0x214, 0x217, 0x219
 
 
@@ -74,7 +74,7 @@ def test_a_signal_ends_it_under_full_load(start: rig.Starter, interface: str) ->
     flood = subprocess.Popen(["cangen", interface, "-g", "0", "-i", "-I", "110", "-L", "8"])
     try:
         sent = Path(f"/sys/class/net/{interface}/statistics/tx_packets")
-        rig.wait_until(lambda: int(sent.read_text()) > 10_000, "cangen sends")
+        rig.wait_until(lambda: int(sent.read_text()) > 3000, "cangen sends")
         assert process.stop()["frames in"] > 0
     finally:
         flood.kill()

@@ -11,7 +11,7 @@ import pytest
 from processes import LEVER, lever
 from vcan import rig
 
-SCENARIO = ("steady", "--set=duration=1.2 s", "--set=converged_after=0.6 s", "--set=limits={}")
+SCENARIO = ("steady", "--set=duration=0.6 s", "--set=converged_after=0.4 s", "--set=limits={}")
 INPUTS = ("110", "111", "120")
 """Identifiers of what the estimator takes."""
 

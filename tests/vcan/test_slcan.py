@@ -12,7 +12,7 @@ import pytest
 from lever_cdkf.can.bus import LeverBus
 from vcan import rig
 
-SAMPLES = 250
+SAMPLES = 150
 ATTACHED = "slcan9"
 
 
