@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
+from processes import lever
 from vcan import rig
 
-LEVER = str(Path(sys.executable).with_name("lever"))
-SHORTENED = ("--set=duration=4 s", "--set=converged_after=1 s", "--set=limits={}")
-
-
-def lever(*arguments: str) -> str:
-    result = subprocess.run([LEVER, *arguments], capture_output=True, text=True)
-    assert result.returncode == 0, result.stderr
-    return result.stdout
+SHORTENED = ("--set=duration=2 s", "--set=converged_after=1 s", "--set=limits={}")
 
 
 def lever_sim(*options: str) -> str:
@@ -29,7 +21,7 @@ def test_with_an_aircraft_the_margin_is_on_the_bus(build_dir: Path, tmp_path: Pa
     settings.write_text(lever_sim("--settings"))
     lever("aircraft", "uh60_like", "gearing=0.5", "-o", str(aircraft))
     options = ["--settings", str(settings), "--aircraft", str(aircraft)]
-    with rig.LeverCan(build_dir / "lever_can", str(link), [*options, "--snapshots", "0.5"], tmp_path, "pty"):
+    with rig.LeverCan(build_dir / "lever_can", str(link), [*options, "--snapshots", "0.25"], tmp_path, "pty"):
         lever_sim("--interface=slcan", f"--channel={link}", "--bus-option=timeout=0.01", f"--out={out}")
     log = (out / "bus.log").read_text()
     (out / "bus.log").write_text(log.replace(f" {link} ", " lever "))  # a name that is short enough for a bus
