@@ -62,7 +62,7 @@ def test_the_wheel_works(installed: Path, tmp_path: Path) -> None:
     paths = subprocess.run([python, "-c", where], capture_output=True, text=True, check=True, cwd=tmp_path).stdout
     assert paths.split() == [str(installed / name) for name in ("lever_cdkf", "lever_sil")]
     lever: list[str | Path] = [python, "-m", "lever_cdkf.cli.main"]
-    short = ("--set", "duration=3 s", "--set", "limits={}")
+    short = ("--set", "duration=1 s", "--set", "limits={}")
     tools.assert_silent([*lever, "sim", "steady", *short, "--out", "sim"], cwd=tmp_path)
     tools.assert_silent([*lever, "replay", "sim/bus.log", "-o", "replay"], cwd=tmp_path)
     assert (tmp_path / "replay/bus.log").read_bytes() == (tmp_path / "sim/bus.log").read_bytes()
