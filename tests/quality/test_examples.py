@@ -1,4 +1,5 @@
-"""The examples of `lever COMMAND --help`: all can be typed, and all that need neither hardware nor minutes are run."""
+"""The examples of `lever COMMAND --help`: all can be typed, and what needs neither hardware nor minutes is run, here or
+by a page."""
 
 from __future__ import annotations
 
