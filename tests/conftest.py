@@ -16,6 +16,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 REQUIRE_ALL = os.environ.get("LEVER_REQUIRE_ALL") == "1"
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # numpy's: more of them wait for each other, at full load
 
 
 def pytest_configure(config: pytest.Config) -> None:
