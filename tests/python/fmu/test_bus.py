@@ -316,7 +316,7 @@ def test_sources_that_fmpy_compiles_send_the_same(
     library.unlink()
     build = tmp_path / "build"
     build.mkdir()
-    build_platform_binary(folder, build, configuration="Release")
+    build_platform_binary(folder, build, configuration="Debug")
     instance = BusInstance(folder)
     for received, answers in flight[:1000]:
         assert frames(instance.exchange(received)) == answers
