@@ -45,7 +45,7 @@ BA_DEF_DEF_ "VFrameFormat" "StandardCAN";
 BA_ "VFrameFormat" BO_ 2566844928 3;
 """
 FD_MAPPED = ("theta=Angle", "theta_dot=Rate", "z_ddot=Acceleration")
-SENT = 10000  # frames: 20 s
+SENT = 5000  # frames: 10 s
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from typing import Any
 import can
 import numpy as np
 import pytest
+import readmes
 from lever_cdkf.can import codec
 from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.native import Config, enum_names, enum_words, run_samples
@@ -42,28 +43,26 @@ def fed_directly(flight: Flight, period: float = 2e-3) -> float:
 
 
 @pytest.mark.parametrize("suffix", ["blf", "asc", "mf4", "csv", "trc", "log"])
-def test_every_log_of_the_bus(suffix: str, folder: Path, flight: Flight, tmp_path: Path) -> None:
-    summary = replayed(tmp_path, folder / f"flight.{suffix}", "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
+def test_every_log_of_the_bus(suffix: str, folder: Path, part: Flight, tmp_path: Path) -> None:
+    summary = replayed(tmp_path, folder / f"part.{suffix}", "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
     assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.02)
-    assert frequency(summary) == pytest.approx(fed_directly(as_decoded(flight)), rel=1e-3)
-    assert summary["samples"] == len(flight.time)
+    assert frequency(summary) == pytest.approx(fed_directly(as_decoded(part)), rel=1e-3)
+    assert summary["samples"] == len(part.time)
     mapping = summary["recording"]["mapping"]
     assert mapping["sample_period_s"] == summary["estimator"]["settings"]["sample_period"] == 2e-3
     assert mapping["inputs"]["z_ddot"]["gravity"] == "included"
-    assert mapping["unprotected_frames"] == 2 * len(flight.time)
-    assert summary["recording"]["frames_left_out"] == {"other_identifiers": round(1.2 * len(flight.time))}
+    assert mapping["unprotected_frames"] == 2 * len(part.time)
+    assert summary["recording"]["frames_left_out"] == {"other_identifiers": round(1.2 * len(part.time))}
 
 
 def test_a_blf_that_is_cut_off_says_so(folder: Path, tmp_path: Path) -> None:
     """Its header holds the length that it had; python-can reads what is left without a word."""
-    whole = (folder / "flight.blf").read_bytes()
+    whole = (folder / "part.blf").read_bytes()
     log = tmp_path / "cut.blf"
     log.write_bytes(whole[: len(whole) // 2])
     summary = replayed(tmp_path / "out", log, "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
     assert f"The log is incomplete: {log.name}: {len(whole) // 2:,} bytes of the {len(whole):,}" in summary["verdict"]
-    whole_summary = replayed(
-        tmp_path / "whole", folder / "flight.blf", "--dbc", folder / "foreign.dbc", "--map", *MAPPED
-    )
+    whole_summary = replayed(tmp_path / "whole", folder / "part.blf", "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
     assert "incomplete" not in whole_summary["verdict"]
 
 
@@ -88,8 +87,9 @@ def test_columns_of_a_csv(folder: Path, flight: Flight, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("has_grip", [False, True])
 def test_a_grip_force_is_fed_where_it_is_mapped(has_grip: bool, flight: Flight, tmp_path: Path) -> None:
-    grip = 20.0 * np.sin(25.0 * flight.time)
-    np.savez(tmp_path / "log.npz", t=flight.time, theta=flight.theta, z=flight.z_ddot, grip=grip)
+    slow = flight.every(5)
+    grip = 20.0 * np.sin(25.0 * slow.time)
+    np.savez(tmp_path / "log.npz", t=slow.time, theta=slow.theta, z=slow.z_ddot, grip=grip)
     mapped = ["theta=theta,unit=rad", "z_ddot=z,unit=m/s^2", *(["grip_force=grip,unit=N"] if has_grip else [])]
     replayed(tmp_path / "out", tmp_path / "log.npz", "--map", *mapped)
     identifier = codec.message("GRIP_SAMPLE").frame_id
@@ -131,7 +131,8 @@ def test_what_the_estimator_warns_of_is_said(flight: Flight, tmp_path: Path) -> 
 def test_the_same_as_a_log_of_lever_dbc_to_the_bit(folder: Path, tmp_path: Path) -> None:
     """What the mapping feeds is in bus.log; replayed as it is, it gives the same trace, but for one fault: that there
     is no torque is none where the mapping says so."""
-    replayed(tmp_path / "mapped", folder / "flight.log", "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
+    arguments = ("--dbc", folder / "foreign.dbc", "--map", *MAPPED, "--length", "8")
+    replayed(tmp_path / "mapped", folder / "flight.log", *arguments)
     again = [line for line in (tmp_path / "mapped/bus.log").read_text().splitlines() if line.endswith("T")]
     (tmp_path / "own.log").write_text("\n".join(again) + "\n")
     replayed(tmp_path / "own", tmp_path / "own.log", "--set", "sample_period=0.002")
@@ -287,10 +288,10 @@ def test_losses_are_counted_by_the_counter_that_the_mapping_names(
     assert "4 lost, 1 repeated" in summary["verdict"]
 
 
-@pytest.mark.parametrize("suffix", ["blf", "asc", "log"])
-def test_can_fd(suffix: str, folder: Path, frames: list[can.Message], flight: Flight, tmp_path: Path) -> None:
-    """The same frames as CAN FD, with 64 bytes of which the database describes eight."""
-    fd = [
+@pytest.fixture(scope="module")
+def fd_frames(frames: list[can.Message]) -> list[can.Message]:
+    """Return a third of the frames as CAN FD, with 64 bytes of which the database describes eight."""
+    return [
         can.Message(
             *(frame.timestamp, frame.arbitration_id, frame.is_extended_id),
             channel=0,
@@ -299,7 +300,11 @@ def test_can_fd(suffix: str, folder: Path, frames: list[can.Message], flight: Fl
         )
         for frame in frames[: len(frames) // 3]
     ]
-    log = write_log(tmp_path / f"fd.{suffix}", fd)
+
+
+@pytest.mark.parametrize("suffix", ["blf", "asc", "log"])
+def test_can_fd(suffix: str, folder: Path, fd_frames: list[can.Message], flight: Flight, tmp_path: Path) -> None:
+    log = write_log(tmp_path / f"fd.{suffix}", fd_frames)
     summary = replayed(tmp_path / "out", log, "--dbc", folder / "foreign.dbc", "--map", *MAPPED)
     assert summary["samples"] == len(flight.time) // 3
     assert frequency(summary) == pytest.approx(NATURAL_FREQUENCY, rel=0.03)
@@ -326,9 +331,9 @@ def test_what_is_written_is_read_back(folder: Path, tmp_path: Path) -> None:
 def test_tune_takes_the_same(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """At 500 Hz nothing is lost; and the command that it prints reads the log in the same way."""
     arguments = ["--dbc", folder / "foreign.dbc", "--map", *MAPPED, "-o", tmp_path / "my.settings", "--length", "21"]
-    arguments += ["--keep", "m_p_walk", "--keep", "c_p_walk", "--keep", "k_p_walk"]
+    arguments += [word for name in readmes.KEPT.split() for word in ("--keep", name)]
     arguments += ["--page", tmp_path / "tune.html", "--clock", "z_ddot"]
-    assert main(["tune", str(folder / "flight.blf"), *map(str, arguments)]) == 0
+    assert main(["tune", str(folder / "flight.log"), *map(str, arguments)]) == 0
     printed = capsys.readouterr()
     assert "gravity is in it, and is subtracted" in printed.err
     assert "sample_period = 0.002" in (tmp_path / "my.settings").read_text()
@@ -359,17 +364,17 @@ def test_tune_takes_the_same(folder: Path, tmp_path: Path, capsys: pytest.Captur
             "z_ddot = AhrsAccel.AccLong: it is 0.1961 m/s² throughout, so it is no measurement",
         ),
         (("theta=LvrAngle,unit=rad",), "is it in degrees"),
-        (("theta=LvrAngle,channel=can7",), "InceptorPosition (0x18fef1fe) is not on can7, but on 0"),
+        (("theta=LvrAngle,channel=can7",), "InceptorPosition (0x18fef1fe) is not on can7, but on can0"),
         (("nothing.toml",), "cannot read nothing.toml: No such file"),
     ],
 )
 def test_what_is_wrong_with_a_mapping(mapped: tuple[str, ...], said: str, folder: Path, refused: Refused) -> None:
     arguments: list[str | Path] = ["--dbc", folder / "foreign.dbc", "--map", "z_ddot=AccVert", *mapped]
-    assert said in refused("replay", folder / "flight.blf", *arguments)
+    assert said in refused("replay", folder / "flight.log", *arguments)
 
 
 def test_what_is_missing(folder: Path, refused: Refused) -> None:
-    log, dbc = folder / "flight.blf", folder / "foreign.dbc"
+    log, dbc = folder / "flight.log", folder / "foreign.dbc"
     assert "add --dbc FILE" in refused("replay", log, "--map", *MAPPED)
     for suffix in ("csv", "parquet", "mat", "npz", "mf4", "blf"):
         nothing = folder / f"nothing.{suffix}"

@@ -6,7 +6,6 @@ import json
 import shlex
 from pathlib import Path
 
-import can
 import cantools.database
 import numpy as np
 import pytest
@@ -19,7 +18,7 @@ from lever_cdkf.signals.recorded import Signal
 from python.conftest import Refused
 from python.report.reading import figures, read, unpack
 from python.signals.databases import AIRCRAFT, WITH_TORQUE, WITHHELD, Aircraft, database
-from python.signals.flight import NATURAL_FREQUENCY, Flight, write_log
+from python.signals.flight import NATURAL_FREQUENCY, Flight
 from python.signals.test_mapped_replay import frequency, replayed
 
 
@@ -29,13 +28,15 @@ def recorded(aircraft: Aircraft, seed: int, flight: Flight, folder: Path) -> tup
     loaded = cantools.database.load_string(text, strict=False)
     assert isinstance(loaded, Database)
     frames = []
-    for k, time in enumerate(flight.time.tolist()):
-        for number, message in enumerate(loaded.messages):
-            values = {field.name: float(field.values[k]) for field in fields if field.message == message.name}
-            data = message.encode(values, strict=False)
-            frames.append(can.Message(time + 1e-5 * number, message.frame_id, False, data=data, channel=0))
+    for number, message in enumerate(loaded.messages):
+        columns = {field.name: field.values.tolist() for field in fields if field.message == message.name}
+        for time, *row in zip(flight.time.tolist(), *columns.values(), strict=True):
+            data = message.encode(dict(zip(columns, row, strict=True)), strict=False)
+            stamp = time + 1e-5 * number
+            frames.append((stamp, f"({stamp:.6f}) can0 {message.frame_id:03X}#{data.hex().upper()}\n"))
     (folder / "foreign.dbc").write_text(text)
-    return write_log(folder / "flight.blf", frames), folder / "foreign.dbc", truth
+    (folder / "flight.log").write_text("".join(line for _, line in sorted(frames)))
+    return folder / "flight.log", folder / "foreign.dbc", truth
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +77,7 @@ def test_at_least_eight_of_ten_are_right(fleet: list[Aircraft], short: Flight, t
 
 
 def test_the_proposal_can_be_used_as_it_is(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    log, dbc = folder / "flight.blf", folder / "foreign.dbc"
+    log, dbc = folder / "flight.log", folder / "foreign.dbc"
     page, toml = tmp_path / "signals.html", tmp_path / "my.toml"
     assert main(["map", str(log), "--dbc", str(dbc), "--toml", str(toml), "-o", str(page)]) == 0
     said = capsys.readouterr().out
@@ -190,7 +191,7 @@ def test_a_database_with_a_flaw_in_a_message_is_read(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_proposed(folder: Path, tmp_path: Path, refused: Refused) -> None:
-    log = folder / "flight.blf"
+    log = folder / "flight.log"
     assert "add --dbc FILE" in refused("map", log)
     assert "plots are .html, " in refused("map", folder / "columns.csv", "-o", tmp_path / "signals.gif")
     (tmp_path / "other.dbc").write_text('BU_: A\nBO_ 5 Nothing: 8 A\n SG_ Zero : 0|8@1+ (1,0) [0|0] "" A\n')
