@@ -208,7 +208,7 @@ def test_once(log: Path, flight: Flight, capsys: pytest.CaptureFixture[str]) -> 
 
 def test_once_of_a_simulation(capsys: pytest.CaptureFixture[str]) -> None:
     running = threading.active_count()
-    assert main(["monitor", "--scenario", "steady", "--once", "--duration", "3"]) == 0
+    assert main(["monitor", "--scenario", "steady", "--once", "--duration", "1"]) == 0
     assert threading.active_count() == running, "it goes on after the picture"
     assert re.search(
         r"^simulation of steady · model lever · watching for 0:\d\d min · firmware 0.2.0$",

@@ -135,23 +135,25 @@ LABELS = """
 """
 
 
-@pytest.mark.parametrize("width", [390, 1280])
 def test_a_scenario_that_starts_over_is_told_and_no_label_lies_on_another(
-    width: int, browser: Browser, start_lever: Start, tmp_path: Path
+    browser: Browser, start_lever: Start, tmp_path: Path
 ) -> None:
+    """On a narrow and on a wide page."""
     steady = (resources.files("lever_sil.scenarios") / "steady.toml").read_text()
     (tmp_path / "brief.toml").write_text(re.sub("(?m)^duration = .*$", 'duration = "2 s"', steady))
     process = start_lever("live", "--scenario", str(tmp_path / "brief.toml"), "--port", "0")
-    browser.begin(width, 844)
-    browser.prepare(LABELS)
-    browser.open(address(process))
-    browser.wait("document.getElementById('notice').textContent.startsWith('The scenario has started over')")
-    assert "simulation of brief, run " in browser.run("document.getElementById('title').textContent")
-    for labels in browser.run("Array.from(document.querySelectorAll('canvas'), e => e.labels)"):
-        assert len(labels) > 4
-        for first, second in itertools.combinations(labels, 2):
-            apart = first[3] <= second[1] or second[3] <= first[1] or first[4] <= second[2] or second[4] <= first[2]
-            assert apart, (first, second)
+    url = address(process)
+    for width in (390, 1280):
+        browser.begin(width, 844)
+        browser.prepare(LABELS)
+        browser.open(url)
+        browser.wait("document.getElementById('notice').textContent.startsWith('The scenario has started over')")
+        assert "simulation of brief, run " in browser.run("document.getElementById('title').textContent")
+        for labels in browser.run("Array.from(document.querySelectorAll('canvas'), e => e.labels)"):
+            assert len(labels) > 4
+            for first, second in itertools.combinations(labels, 2):
+                apart = first[3] <= second[1] or second[3] <= first[1] or first[4] <= second[2] or second[4] <= first[2]
+                assert apart, (width, first, second)
     end(process)
 
 

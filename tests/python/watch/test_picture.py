@@ -317,12 +317,13 @@ def test_other_traffic_is_counted_and_harmless(flight: Flight) -> None:
 # --- history ---------------------------------------------------------------------------------------------------------
 
 
-def test_history_has_a_row_a_step_and_is_bounded(flight: Flight) -> None:
+def test_history_has_a_row_a_step_and_is_bounded(flight: Flight, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lever_cdkf.watch.picture.ROWS", ROWS // 10)
     picture, frames = Picture(), flight.frames(50)
-    for k in range(2 * ROWS * 3):
+    for k in range(2 * ROWS // 10 * 3):
         picture.take(frames if k % 100 == 0 else [], k * STEP / 3)
     lengths = {len(column) for column in picture.history.values()}
-    assert lengths == {ROWS}
+    assert lengths == {ROWS // 10}
     times = list(picture.history["time"])
     steps = [after - before for before, after in itertools.pairwise(times)]
     assert steps == pytest.approx([STEP] * len(steps))
