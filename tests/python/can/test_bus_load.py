@@ -15,7 +15,7 @@ from lever_cdkf.can.commander import KEEP_ALIVE, Commander
 from lever_cdkf.firmware.aircraft import AircraftResponse
 
 README = Path(__file__).parents[3] / "firmware/can/README.md"
-START, SECONDS, BIT_RATE = 1.0, 4.0, 1_000_000
+START, SECONDS, BIT_RATE = 1.0, 2.0, 1_000_000
 """Time left to the alignment, in which nothing is driven [s]; what is counted after it [s]; bits each second."""
 BEHIND_CRC = 1 + 2 + 7 + 3
 """Delimiter of the CRC, acknowledgement, end of frame, interframe space: not stuffed."""

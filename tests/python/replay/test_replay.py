@@ -126,13 +126,16 @@ def test_two_replays_are_equal_in_every_file(session: Session, replay: tuple[Pat
 
 
 def test_another_format_gives_the_same_estimates(session: Session, tmp_path: Path) -> None:
-    path = tmp_path / "session.mf4"
-    with can.LogReader(session.log) as reader, can.Logger(path) as logger:
+    part, path = tmp_path / "part.log", tmp_path / "part.mf4"
+    part.write_text("".join(f"{line}\n" for line in session.lines[:8000]))
+    with can.LogReader(part) as reader, can.Logger(path) as logger:
         for message in reader:
             logger.on_message_received(message)
     summary = replayed(tmp_path / "out", path)
     assert summary["comparison"]["identical"] is True
-    assert estimates(tmp_path / "out/bus.log") == estimates(session.log)
+    expected = estimates(part)
+    assert estimates(tmp_path / "out/bus.log")[: len(expected)] == expected
+    assert len(expected) > 3000
 
 
 # --- what else is in a log -------------------------------------------------------------------------------------------
