@@ -90,7 +90,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 
 # --- one grammar ---
 
-RANDOM_FILES = 5000
+RANDOM_FILES = 3000
 
 
 def bits(assignments: dict[str, str | float]) -> str:
