@@ -26,7 +26,7 @@ CHANGING = {
     for name, least, greatest in (("c_p", "15 N s/m", "140 N s/m"), ("k_p", "500 N/m", "3900 N/m"))
 }
 REGRIP = {
-    name: f'{{ kind = "steps", first = "{first}", at = ["40 s"], to = ["{then}"] }}'
+    name: f'{{ kind = "steps", first = "{first}", at = ["30 s"], to = ["{then}"] }}'
     for name, first, then in (("c_p", "48 N s/m", "75 N s/m"), ("k_p", "1700 N/m", "2600 N/m"))
 }
 """A pilot who tightens his grip."""

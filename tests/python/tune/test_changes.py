@@ -18,17 +18,17 @@ TRUTH = {"z_ddot_gain": 1.0, "z_ddot_delay": 4e-3, "lever_friction": 0.3}
 
 @pytest.fixture(scope="module")
 def regripped(simulate: Simulate) -> Path:
-    """Eighty seconds, of which the arm is half as strong again in the second half."""
-    return simulate(80.0, regrip=True, delay=TRUTH["z_ddot_delay"], friction=TRUTH["lever_friction"])
+    """A minute, of which the arm is half as strong again in the second half."""
+    return simulate(60.0, regrip=True, delay=TRUTH["z_ddot_delay"], friction=TRUTH["lever_friction"])
 
 
 def test_a_change_of_grip_is_left_out(regripped: Path) -> None:
     likelihood = Likelihood(recording.read([regripped]), held_out=0.0)
     before = likelihood.tuned_on.sum()
     entries = calibrate(likelihood, {}).entries
-    assert any(40.0 < begin < 42.0 for begin, _ in likelihood.changes)
+    assert any(30.0 < begin < 32.0 for begin, _ in likelihood.changes)
     time = likelihood.recording.time
-    assert not likelihood.tuned_on[(time > 40.5) & (time < 43.0)].any()
+    assert not likelihood.tuned_on[(time > 30.5) & (time < 33.0)].any()
     assert 0.7 * before < likelihood.tuned_on.sum() < before
     for entry in entries:
         assert entry.verdict == "found", entry
