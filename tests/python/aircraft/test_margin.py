@@ -68,11 +68,11 @@ def test_margins_are_those_of_the_linearised_loop(name: str) -> None:
 
 @pytest.mark.requirement("R42")
 def test_standard_deviations_are_those_of_drawn_arms() -> None:
-    """1000 arms with independent log-normal errors of 10 %."""
+    """400 arms with independent log-normal errors of 10 %."""
     arm, coupled = np.array((2.5, 30.0, 1500.0)), Coupled(aircraft.load("uh60_like"), 0.5)
     found = said(arm, 0.1, table(coupled))
     random = np.random.default_rng(4)
-    drawn = [expected(arm * np.exp(0.1 * random.standard_normal(3)), coupled) for _ in range(1000)]
+    drawn = [expected(arm * np.exp(0.1 * random.standard_normal(3)), coupled) for _ in range(400)]
     assert found.gain_margin_sigma == pytest.approx(np.std([decibels(each.gain) for each in drawn]), rel=0.1)
     assert found.frequency_sigma == pytest.approx(np.std([each.frequency for each in drawn]), rel=0.1)
     assert found.modulus_sigma == pytest.approx(np.std([each.modulus for each in drawn]), rel=0.15)

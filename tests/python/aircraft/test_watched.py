@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import pyarrow.csv
 import pyarrow.parquet
 import pytest
 from lever_cdkf.can import codec
@@ -16,6 +17,7 @@ from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.aircraft import AircraftResponse, read_response
 from lever_cdkf.firmware.native import Config, Estimator
 from lever_cdkf.firmware.settings_file import format_config
+from lever_cdkf.numeric.arrays import FloatArray
 from lever_cdkf.watch import panels, status
 from lever_cdkf.watch.picture import Picture
 from lever_cdkf.watch.sources import LogSource
@@ -28,7 +30,14 @@ from python.conftest import Refused, Run, Session
 from python.report.reading import figures, read
 
 SAME = ("sim", "replay")
+Columns = dict[str, FloatArray]
 CHANGED = "uh60_like,gearing=0.5,warning=30"
+
+
+@cache
+def trace_of(folder: Path) -> Columns:
+    table = pyarrow.csv.read_csv(folder / "trace.csv")
+    return {name: table[name].to_numpy() for name in table.column_names}
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +57,7 @@ def test_the_margin_is_that_of_the_estimator_with_the_same_samples(session: Sess
         time_us, *values = (float(value) for value in row)
         estimator.update(int(time_us), *(None if np.isnan(value) else value for value in values))
     expected = estimator.stability()
-    trace = np.genfromtxt(out / "trace.csv", delimiter=",", names=True)
+    trace = trace_of(out)
     for column, value, step in (
         ("gain_margin_dB", expected.gain_margin, 0.02),
         ("gain_margin_sigma_dB", expected.gain_margin_sigma, 0.04),
@@ -72,7 +81,7 @@ def test_every_file_has_it(out: Path) -> None:
 def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a simulation of a scenario with an aircraft, and the replay of its log with the same."""
     folder = tmp_path_factory.mktemp("flown")
-    cancelled = ("estimator.mitigation='cancellation'", "duration=8 s", "pilot.c_p=30 N s/m", "limits={}")
+    cancelled = ("estimator.mitigation='cancellation'", "duration=6 s", "pilot.c_p=30 N s/m", "limits={}")
     overrides = [part for each in cancelled for part in ("--set", each)]
     assert main(["sim", "bounce", *overrides, "-o", str(folder / "sim")]) == 0
     watched = ["--aircraft", "uh60_like,gearing=0.5"]
@@ -81,10 +90,6 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     log = str(folder / "sim" / "bus.log")
     assert main(["replay", log, *watched, "--settings", str(settings), "-o", str(folder / "replay")]) == 0
     return folder
-
-
-def trace_of(folder: Path) -> Any:
-    return np.genfromtxt(folder / "trace.csv", delimiter=",", names=True)
 
 
 def test_a_loop_that_is_unstable_is_told(lever: Run) -> None:
@@ -102,10 +107,10 @@ def test_a_run_beyond_all_bounds_is_one_line(change: str, refused: Refused) -> N
 
 
 def test_a_simulation_has_what_a_replay_of_its_log_has(flown: Path) -> None:
-    of_sim, of_replay = (np.genfromtxt(flown / each / "trace.csv", delimiter=",", names=True) for each in SAME)
+    of_sim, of_replay = (trace_of(flown / each) for each in SAME)
     for column in ("bounce", "gain_margin_dB", "gain_margin_sigma_dB", "modulus", "correction_rad"):
         assert np.array_equal(of_sim[column], of_replay[column], equal_nan=True)
-    assert np.count_nonzero(of_sim["correction_rad"]) > 5000
+    assert np.count_nonzero(np.nan_to_num(of_sim["correction_rad"])) > 3000
     of_sim, of_replay = (json.loads((flown / each / "summary.json").read_text())["stability"] for each in SAME)
     truth = {"least_true_margin_db": None, "unstable_s": None}
     assert of_sim | truth == of_replay
@@ -116,7 +121,7 @@ def test_a_simulation_has_what_a_replay_of_its_log_has(flown: Path) -> None:
 
 
 def test_a_simulation_knows_the_true_margin(flown: Path) -> None:
-    trace = np.genfromtxt(flown / "sim" / "trace.csv", delimiter=",", names=True)
+    trace = trace_of(flown / "sim")
     coupled = Coupled(aircraft.load("uh60_like"), 0.5)
     truth = scenario.load("bounce", ["pilot.c_p=30 N s/m"]).truth(np.zeros(1))
     expected = decibels(margins(loop_of(coupled, truth.transfer(np.array([0])), 0)).gain)

@@ -20,7 +20,10 @@ from python.conftest import Refused
 from python.report.reading import Reader, figures, unpack
 
 
-def test_the_reduced_table_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_reduced_table_holds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(os, "cpu_count", lambda: 1)
     files = ["--out", str(tmp_path), "--json", str(tmp_path / "rows.json")]
     status = main(["bounce", "--quick", "--seeds", "1", *files])
     printed = capsys.readouterr().out
