@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -50,6 +51,7 @@ def band_noise(rng: np.random.Generator, runs: int, count: int, rms: float, peri
     return scaled
 
 
+@cache
 def simulate(plan: Plan) -> Batch:
     """Return the truth moves as Batch.move says, w walks, theta_dot walks besides."""
     rng = np.random.default_rng(plan.seed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -30,12 +31,19 @@ CASES = (
 )
 
 
+@cache
+def drawn(name: str) -> tuple[Batch, NDArray[np.int64]]:
+    """Return a second of a case, and the samples after which it is compared."""
+    case = cases.cases()[name]
+    batch = case.batch(cases.Plan(seeds=2, duration=1.0))
+    return batch, run_cases.samples(case, batch)
+
+
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("baseline", REFERENCES)
 def test_the_c_says_what_the_reference_says(name: str, baseline: str) -> None:
-    case = cases.cases()[name]
-    batch = case.batch(cases.Plan(seeds=2, duration=2.0))
-    agree(baseline, batch, np.append(0, run_cases.samples(case, batch)))  # also before the first sample is followed
+    batch, at = drawn(name)
+    agree(baseline, batch, np.append(0, at))  # also before the first sample is followed
 
 
 def agree(baseline: str, batch: Batch, at: NDArray[np.int64]) -> None:
@@ -54,9 +62,7 @@ def agree(baseline: str, batch: Batch, at: NDArray[np.int64]) -> None:
 @pytest.mark.parametrize("baseline", ["joint_ekf", "joint_ukf"])
 def test_a_missing_output_is_skipped_as_the_reference_does(baseline: str) -> None:
     """Theta of every sample, or now and then one of them or both."""
-    case = cases.cases()["lever_trim_base_rough"]
-    batch = case.batch(cases.Plan(seeds=2, duration=1.0))
-    at = run_cases.samples(case, batch)
+    batch, at = drawn("lever_trim_base_rough")
     half = replace(batch, missing=np.tile([True, False], (2, batch.samples, 1)))
     some = replace(batch, missing=np.random.default_rng(1).random((2, batch.samples, 2)) < 0.3)
     for one in (half, some):
