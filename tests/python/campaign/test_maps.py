@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -111,8 +112,8 @@ def test_a_run_whose_error_is_no_number_has_diverged(small: Plan, folder: Path, 
 
 
 @pytest.fixture(scope="session")
-def made_map(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
-    """Return the same with the axes the other way round, and one flight at each point."""
+def made_map(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path, Sequence[str]]:
+    """Return the same with the axes the other way round, one flight at each point, and the files of its maps."""
     place = tmp_path_factory.mktemp("map")
     head, noise, adaptation = (
         SMALL.replace("seeds = 4", "seeds = 1").replace("chunk = 1", "chunk = 6").split("[[vary]]")
@@ -121,16 +122,15 @@ def made_map(tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Path]:
     plan = Plan(spec.load(str(place / "swapped.toml")))
     (place / "swapped.toml").unlink()
     chunks.make(plan, plan.chunk(0), place)
-    return plan, place
+    return plan, place, maps.write(plan, place)
 
 
 def test_no_map_over_names(small: Plan, folder: Path) -> None:
     assert maps.write(small, folder) == ()
 
 
-def test_files(made_map: tuple[Plan, Path]) -> None:
-    plan, place = made_map
-    written = maps.write(plan, place)
+def test_files(made_map: tuple[Plan, Path, Sequence[str]]) -> None:
+    plan, place, written = made_map
     assert {file.name for file in place.iterdir() if file.suffix != ".parquet"} == set(written)
     page = (place / "map.html").read_text()
     for title in ("Error", "Coverage", "NEES", "Settling", "Where tracking fails"):
@@ -145,13 +145,15 @@ def test_files(made_map: tuple[Plan, Path]) -> None:
 
 
 def test_figures_of_a_campaign_are_made_from_its_folder_alone(
-    made_map: tuple[Plan, Path], lever: Run, tmp_path: Path
+    made_map: tuple[Plan, Path, Sequence[str]], lever: Run, tmp_path: Path
 ) -> None:
-    plan, place = made_map
-    spec.save(plan.spec, place)
-    maps.write(plan, place)
+    plan, place, _ = made_map
     names = ("map_error", "map_coverage")
-    assert lever("figures", "--campaign", place, "--only", *names, "--out", tmp_path)[0] == 0
+    spec.save(plan.spec, place)
+    try:
+        assert lever("figures", "--campaign", place, "--only", *names, "--out", tmp_path)[0] == 0
+    finally:
+        (place / spec.FILE).unlink()
     written = {file.name for file in tmp_path.iterdir()}
     assert written >= {f"{name}.{kind}" for name in names for kind in ("pdf", "svg", "png", "csv")}
     assert 'id="map_error"' in (tmp_path / "figures.html").read_text()
