@@ -18,7 +18,7 @@ OF = (
     "tests/oracle/*.py",
     "host_tools/lever_cdkf/models/*.py",
     "firmware/lever_settings.def",
-    "tests/python/oracle/*.py",
+    "tests/python/oracle/test_oracle_against_firmware.py",
 )
 
 
