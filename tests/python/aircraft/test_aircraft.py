@@ -119,19 +119,19 @@ def loop_with(craft: Aircraft, truth: Truth, gearing: float) -> Response:
 @pytest.mark.parametrize("pilot", pilots())
 @pytest.mark.parametrize("name", AIRCRAFT)
 def test_growth_is_that_of_the_linearised_loop(name: str, pilot: str) -> None:
-    """10 % beyond the gain margin; growth rate and frequency by linear prediction of the last 2.5 s of 5 s."""
+    """40 % beyond the gain margin; growth rate and frequency by linear prediction of the last second of two."""
     craft, truth = aircraft.load(name), pilots()[pilot]
     limit = margins(loop_with(craft, truth(2), 1.0))
-    beyond = 1.1 * limit.gain
+    beyond = 1.4 * limit.gain
     root = mode(loop_with(craft, truth(2), beyond), 2j * math.pi * limit.frequency)
-    theta, _ = coupled_motion(Coupled(craft, beyond), truth(5000), 5000)
-    late = theta[2500::20]
+    theta, _ = coupled_motion(Coupled(craft, beyond), truth(2000), 2000)
+    late = theta[1000::20]
     behind, ahead = np.stack((late[1:-1], late[:-2]), axis=1), late[2:]
     (one, two), *_ = np.linalg.lstsq(behind, ahead, rcond=None)
     growth = np.log(np.roots((1.0, -one, -two)).astype(complex)[0]) / (20 * PERIOD)
     assert np.abs(theta).max() < math.radians(1.0)
-    assert growth.real == pytest.approx(root.real, rel=0.03)
-    assert abs(growth.imag) == pytest.approx(root.imag, rel=0.03)
+    assert growth.real == pytest.approx(root.real, rel=0.01)
+    assert abs(growth.imag) == pytest.approx(root.imag, rel=0.001)
 
 
 @pytest.mark.parametrize("name", AIRCRAFT)
@@ -148,12 +148,12 @@ def test_the_gain_margin_is_where_the_loop_becomes_unstable(name: str) -> None:
 
 
 def test_instability_ends_in_a_limit_cycle() -> None:
-    craft, truth = aircraft.load("uh60_like"), pilots()["slack arm"](24_000)
-    theta, z_ddot = coupled_motion(Coupled(craft, 0.6), truth, 24_000)
-    earlier, later = np.abs(theta[16_000:19_000]).max(), np.abs(theta[20_000:]).max()
+    craft, truth = aircraft.load("uh60_like"), pilots()["slack arm"](14_000)
+    theta, z_ddot = coupled_motion(Coupled(craft, 0.8), truth, 14_000)
+    earlier, later = np.abs(theta[9_000:11_000]).max(), np.abs(theta[12_000:]).max()
     assert later == pytest.approx(earlier, rel=0.01)
     assert math.radians(5.0) < later < math.radians(30.0)
-    assert np.abs(z_ddot[20_000:]).max() > 5.0
+    assert np.abs(z_ddot[12_000:]).max() > 5.0
 
 
 @pytest.mark.parametrize(
