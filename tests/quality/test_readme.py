@@ -25,7 +25,6 @@ import pytest
 import readmes
 from lever_cdkf.cli.main import _parser
 from lever_cdkf.signals.mapping import read_mapping
-from lever_sil.study.figures.catalogue import FIGURES
 from quality import tools
 from quality.conftest import SourceTree
 
@@ -51,7 +50,6 @@ SHORTER = {
     r"(lever compare .*)--seeds 20": r"\1--seeds 1 --duration 1",
     r"(lever sim .*)--seeds 20": r"\1--seeds 1",
     r"lever faults --quick": r"\g<0> --only theta_stuck",
-    r"lever figures --only grip": "lever figures --only states",
     r"lever soak --hours 0.2": "lever soak --hours 0.05",
     r"lever compare --paper": r"\g<0> --seeds 1 --duration 1 --estimators dual_annealing rls",
     r"lever campaign quick(?= -o)": "lever campaign quick.toml --workers 1",
@@ -199,11 +197,6 @@ def test_what_is_not_run_says_why_and_can_be_typed(page: Path) -> None:
     for block in readmes.blocks(page, "console").values():
         for command in readmes.lever_commands(block):
             _parser().parse_args(command)
-
-
-def test_the_figure_that_the_readme_asks_for_is_one() -> None:
-    """Another is drawn, in half the time (SHORTER)."""
-    assert "grip" in FIGURES
 
 
 def test_a_mapping_file_is_one(tmp_path: Path) -> None:
