@@ -481,7 +481,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 2160 };
+enum lever_state_limits { LEVER_STATE_BYTES = 2162 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

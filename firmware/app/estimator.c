@@ -191,8 +191,7 @@ static void add_motion(estimator_t *estimator, const checked_t *sample, float el
             const float angle = rate - (estimator->setup.constants.trim ? 0.0f : trim_angle(&estimator->trim));
             rate = (RATE_OF_ANGLE * estimator->trim.corner) * angle;
         }
-        evidence_add_motion(
-            &estimator->learning.evidence, i, rate, elapsed, estimator->setup.settings->excitation_time);
+        evidence_add_motion(&estimator->learning.evidence, i, rate, elapsed, estimator->setup.settings);
     }
 }
 
@@ -307,7 +306,7 @@ static void advance(estimator_t *estimator, checked_t *sample, const inputs_t *l
 static void step(estimator_t *estimator, checked_t *sample, const inputs_t *last, float elapsed)
 {
     const uint32_t periods = periods_in(estimator, elapsed);
-    estimator->learning.evidence.periods += periods;
+    evidence_add_time(&estimator->learning.evidence, elapsed, estimator->setup.settings->sample_period, periods);
     estimator->trim.unsettled -= elapsed; /* before this sample may set it */
     note(estimator, elapsed < (CLOCK_MIN * estimator->setup.settings->sample_period), LEVER_FAULT_CLOCK);
     if (periods > 1u) {

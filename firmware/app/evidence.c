@@ -22,7 +22,8 @@
 #define AGREEMENT_MEMORY 0.5f   /* of motor and kinematics [s] */
 #define MOTOR_LAG 0.003f        /* motors lag by 1 to 5 ms [s] */
 #define TORQUE_MIN 4e-4f        /* mean square of the command from which on it says anything [N^2 m^2] */
-#define TORQUE_SURE 1.6f        /* torque of other origin over the command, both rms, that this is allowed times */
+#define TORQUE_SURE 1.6f        /* torque of other origin over the command, both rms, that this is allowed times, */
+#define TORQUE_GAIN_SURE 1.4f   /* and where it forbids nothing */
 #define KINEMATICS_CORNER 5.0f  /* of the high-pass [rad/s] */
 #define KINEMATICS_STEP 0.03f   /* of the angle from sample to sample, from which on it is none of the lever [rad] */
 #define KINEMATICS_LINE 0.0105f /* the rate is on a straight line between samples that are so close [s] */
@@ -165,13 +166,13 @@ void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float sl
     }
 }
 
-void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, float slow_time)
+void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, const lever_settings_t *s)
 {
     motion_t *motion = &evidence->motion;
     const float square = rate * motion->last[i];
     motion->last[i] = rate;
-    if (elapsed < TRIM_OUTAGE) {
-        motion->slow = greater(motion->slow + (share_of(elapsed, slow_time) * (square - motion->slow)), 0.0f);
+    if ((elapsed < TRIM_OUTAGE) || (elapsed < (1.5f * s->sample_period))) {
+        motion->slow = greater(motion->slow + (share_of(elapsed, s->excitation_time) * (square - motion->slow)), 0.0f);
         motion->fast += lesser(elapsed * (1.0f / NIS_TIME), 1.0f) * (square - motion->fast);
     }
 }
@@ -269,19 +270,19 @@ static void judge_motor(evidence_t *evidence, float period, float sample_period)
 {
     const float least = TORQUE_MIN * (AGREEMENT_MEMORY / ((float)EVIDENCE_TORQUE_EVERY * sample_period));
     const bool says = (evidence->torque.expected > least);
-    const float away = says ? agreement_away(&evidence->torque, TORQUE_SURE) : 0.0f;
-    evidence_set(evidence, EVIDENCE_MOTOR, away);
-    evidence_set(evidence, EVIDENCE_TORQUE_GAIN, away);
+    evidence_set(evidence, EVIDENCE_MOTOR, says ? agreement_away(&evidence->torque, TORQUE_SURE) : 0.0f);
+    evidence_set(evidence, EVIDENCE_TORQUE_GAIN, says ? agreement_away(&evidence->torque, TORQUE_GAIN_SURE) : 0.0f);
     agreement_forget(&evidence->torque, 1.0f - share_of(period, AGREEMENT_MEMORY));
 }
 
-/* Lost samples count as so many periods: what is left is the clock. */
-static void judge_clock(evidence_t *evidence, float period, float sample_period)
+/* Samples are too far apart even if each long interval is one in which some were lost, or too close even if none is:
+ * intervals of any length that are right in the mean are neither. */
+static void judge_clock(evidence_t *evidence, float period)
 {
-    const float error = (period / (sample_period * (float)evidence->periods)) - 1.0f;
-    evidence->clock += share_of(period, CLOCK_MEMORY) * (error - evidence->clock);
-    evidence->periods = 0u;
-    evidence_set(evidence, EVIDENCE_CLOCK, fabsf(evidence->clock));
+    const float keep = 1.0f - share_of(period, CLOCK_MEMORY);
+    evidence_set(evidence, EVIDENCE_CLOCK, greater(evidence->slow, evidence->fast) * (1.0f / CLOCK_MEMORY));
+    evidence->slow *= keep;
+    evidence->fast *= keep;
 }
 
 /* Compares the angle with the integral of the rate. The gain's standard deviation is what else differs, over the root
@@ -372,7 +373,7 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     }
     judge_motor(evidence, period, setup->settings->sample_period);
     judge_kinematics(evidence, period, setup->settings->sample_period);
-    judge_clock(evidence, period, setup->settings->sample_period);
+    judge_clock(evidence, period);
     if ((block->known || block->held) && !evidence_has(evidence, EVIDENCE_HANDS) &&
         !evidence_has(evidence, EVIDENCE_KINEMATICS)) { /* what does not agree says nothing of the base */
         judge_base(evidence, &sudden, period);
@@ -437,5 +438,4 @@ void evidence_resume(evidence_t *evidence)
 {
     trust_base(evidence);
     whiteness_start(&evidence->whiteness);
-    evidence->periods = 0u;
 }

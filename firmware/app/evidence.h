@@ -83,7 +83,8 @@ typedef struct evidence {
     float commanded_level;
     float measured_level;
     float other_torque; /* mean square of what the motor was not asked for, while it was measured [N^2 m^2] */
-    float clock;        /* time between samples over sample_period, less 1, with exponential forgetting */
+    float slow; /* time by the clock less that by sample_period, where a long interval is so many lost samples [s], */
+    float fast; /* and the other way round, if none was lost; with exponential forgetting */
     kinematics_t kinematics;
     change_detection_t change;
     whiteness_t whiteness;
@@ -91,7 +92,6 @@ typedef struct evidence {
     calibration_t calibration;
     hands_t hands;
     grip_force_t force;
-    uint32_t periods;        /* of samples, lost ones too, in this block */
     bool seen[SIGNAL_COUNT]; /* in this block */
     bool paired;             /* the last sample measured both outputs */
     bool opened;             /* the last change was to another pilot */
@@ -152,6 +152,13 @@ static inline bool evidence_repeats(const evidence_t *evidence, enum signal sign
 /* Output y, which is not valid where it is refused. The squares of innovations are now `level` times those expected. */
 bool evidence_refuses_output(evidence_t *evidence, const cdkf_t *cdkf, uint32_t i, float y, float level, float elapsed);
 
+/* A sample `elapsed` after the last, by its clock, where so many of `period` have passed, if others were lost [s]. */
+static inline void evidence_add_time(evidence_t *evidence, float elapsed, float period, uint32_t periods)
+{
+    evidence->slow += elapsed - (period * (float)periods);
+    evidence->fast += period - elapsed;
+}
+
 /* The torque that was commanded before this sample [N m], by each. */
 void evidence_follow_command(evidence_t *evidence, float commanded, float elapsed);
 
@@ -172,7 +179,7 @@ void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float sl
 /* The measured rate, or what is presumed of it [rad/s], by output i. As the product of successive samples: unlike
  * motion, the noise of a sensor differs from sample to sample. The prediction is no evidence of motion: the base drives
  * it on a lever that is locked. */
-void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, float slow_time);
+void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, const lever_settings_t *s);
 
 /* Whether there is motion enough to learn from, beyond what the noise of theta_dot looks like. */
 static inline bool evidence_is_at_rest(const evidence_t *evidence, float least, float noise)

@@ -54,7 +54,6 @@ static const state_row_t rows[] = {
     FLAGS(estimator.learning.evidence.hands.idle, estimator.learning.evidence.hands.idle),
     FLOATS(estimator.learning.evidence.force.raw, estimator.learning.evidence.force.means.time),
     FLAGS(estimator.learning.evidence.force.seen, estimator.learning.evidence.force.wrong),
-    MEMBERS(estimator.learning.evidence.periods, estimator.learning.evidence.periods, 4u, UINT16_MAX),
     FLAGS(estimator.learning.evidence.seen[0], estimator.learning.evidence.opened),
     FLOATS(estimator.learning.noise.elapsed, estimator.learning.elapsed),
     BYTES(estimator.learning.verdict, estimator.learning.verdict, (uint32_t)VERDICT_COUNT - 1u),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import signal
 from collections import deque
@@ -20,7 +19,6 @@ from lever_cdkf.cli.main import main
 from lever_cdkf.firmware.config import CHOICES
 from lever_cdkf.firmware.library import enum_names
 from lever_cdkf.firmware.native import Config
-from lever_cdkf.report import document
 from lever_sil.run.runner import SimulationResult, simulate
 from lever_sil.scenarios import scenario
 from lever_sil.scenarios.scenario import Scenario
@@ -93,14 +91,6 @@ def _ctrl_c() -> None:
     """Restore SIGINT where the tests are started in the background of a shell, which ignores it."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _plotly_packed_once() -> Iterator[None]:
-    """Pack plotly.js, which is most of every page and the same in all, for the first page of this process only."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(document, "_packed", functools.lru_cache(maxsize=2)(document._packed))
-        yield
 
 
 Run = Callable[..., tuple[int, str, str]]

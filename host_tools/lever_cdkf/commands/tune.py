@@ -162,7 +162,7 @@ def _as_recorded(assignments: Assignments, recording: Recording) -> Assignments:
         _note(f"by COMMAND in the log, {name} is {value}")
     assignments = {**chosen, **assignments}
     set_to = make_config(assignments).settings["sample_period"]
-    if abs(recording.period - set_to) <= 0.1 * set_to:
+    if abs(recording.period - set_to) <= 0.04 * set_to:
         return assignments
     _note(
         f"the log has a sample each {1e3 * recording.period:g} ms: sample_period becomes that (was {1e3 * set_to:g} ms)"

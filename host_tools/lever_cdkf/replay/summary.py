@@ -172,7 +172,7 @@ def _troubles(summary: ReplaySummary) -> list[str]:
     if recording.model_changes:
         troubles.append("A COMMAND in the log changes the model on the way; the estimates of the first one are shown.")
     step, period = recording.typical_step_s, summary.estimator.settings["sample_period"]
-    if step and not 0.7 < step / period < 1.4:
+    if step and not 0.95 < step / period < 1.05:
         troubles.append(
             f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: add "
             f"--set sample_period={step:.4g}."

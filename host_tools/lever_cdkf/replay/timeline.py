@@ -46,7 +46,7 @@ class Timeline:
         """`period`: that of the samples [s]."""
         self.clocks = Clocks()
         self.typical_step_us = 0
-        """Median step of the first piece [us]; 0 before it."""
+        """Step between samples of the first piece [us]; 0 before it."""
         self._period_us = period * 1e6
         self._now = 0  # [us] since the first sample
         self._last: tuple[int, int] | None = None  # recorded and sample time of the last one [us]
@@ -58,7 +58,7 @@ class Timeline:
         steps = self._steps(np.diff(recorded_us, prepend=recorded_0), np.diff(sender, prepend=sender_0))
         if self._last is None:
             self.clocks.late -= 1  # the first sample is no step
-            self.typical_step_us = int(np.median(steps[1:])) if len(steps) > 1 else 0
+            self.typical_step_us = round(_typical(steps[1:], self._period_us)) if len(steps) > 1 else 0
         self._last = int(recorded_us[-1]), int(sender[-1])
         self._note_gaps(steps)
         time_us = self._now + np.cumsum(steps)
@@ -86,3 +86,14 @@ class Timeline:
         gaps = steps[steps > GAP * self._period_us]
         self.clocks.gaps += len(gaps)
         self.clocks.longest_gap_s = max(self.clocks.longest_gap_s, float(gaps.max()) / 1e6 if len(gaps) else 0.0)
+
+
+def _typical(steps: IntArray, period: float) -> float:
+    """Return the step of most samples; where that is near the period, of the mean, as the firmware judges a clock: the
+    period, unless steps are longer though each long one is that of lost samples, or shorter though none is.
+    """
+    most = float(np.median(steps))
+    if not 0.7 < most / period < 1.4:
+        return most
+    longer = float(steps.sum() / np.maximum(np.rint(steps / period), 1.0).sum())
+    return longer if longer > period else min(float(steps.mean()), period)

@@ -1,6 +1,7 @@
 """A page that needs nothing else: HTML, its style, plotly.js, the figures, and the script that draws them."""
 
 import base64
+import functools
 import gzip
 import html
 import json
@@ -19,17 +20,23 @@ def document(title: str, body: str, figures: Mapping[str, Spec], style: str = ""
     page.css.
     """
     require("report")
-    import plotly.offline
-
     here = files(__package__)
     return Template((here / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
         css=(here / "page.css").read_text(encoding="utf-8") + style,
         body=body,
         figures=_packed(json.dumps(figures, separators=(",", ":"), allow_nan=False)),
-        plotly=_packed(plotly.offline.get_plotlyjs()),
+        plotly=_plotly(),
         script=(here / "page.js").read_text(encoding="utf-8"),
     )
+
+
+@functools.cache
+def _plotly() -> str:
+    """Return plotly.js packed: most of every page, and the same in all."""
+    import plotly.offline
+
+    return _packed(plotly.offline.get_plotlyjs())
 
 
 def _packed(text: str) -> str:

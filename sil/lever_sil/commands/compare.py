@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lever_cdkf.cli.layout import say
+from lever_cdkf.cli.layout import say, warn
 from lever_cdkf.cli.progress import Progress
 from lever_cdkf.cli.tables import Row, add_json_option
 from lever_cdkf.errors import LeverError
@@ -137,6 +137,8 @@ def _compare(args: argparse.Namespace) -> int:
     todo = run_cases.tasks(names, _estimators(args), plan)
     if not todo:
         raise LeverError("none of these estimators takes part in any of these cases; see `lever compare --list`")
+    if idle := [name for name in args.estimators or () if name not in {task.entrant for task in todo}]:
+        warn(f"{', '.join(idle)}: not run, as none of these cases has it; `lever compare --list` has what runs together")
     if args.out is not None:
         make_folder(args.out)  # before a campaign that could then not be kept
     with Progress("compare") as progress:
@@ -167,7 +169,8 @@ def _compare(args: argparse.Namespace) -> int:
                     path.write_bytes(content)
             write_text(outputs.path("provenance.json"), origin.with_outputs(outputs.written(*names)).text())
             outputs.finish()
-        say(f"Written to {args.out}: compare.html, compare.csv, figures as .pdf, .svg and .csv, provenance.json")
+        drawn = "figures as .pdf, .svg and .csv, " if figures else ""
+        say(f"Written to {args.out}: compare.html, compare.csv, {drawn}provenance.json")
     return 0
 
 

@@ -364,8 +364,8 @@ def test_settings_that_the_firmware_refuses_are_one_line(session: Session, refus
         ("recording", "damaged_lines", 3, "3 of its lines are not frames."),
         ("recording", "clock_restarts", 2, "The sender's clock started over 2 times."),
         ("recording", "model_changes", 1, "changes the model on the way"),
-        ("recording", "typical_step_s", 1.41e-3, "is 1 ms: add --set sample_period=0.00141."),
-        ("recording", "typical_step_s", 0.69e-3, "Samples come every 0.69 ms"),
+        ("recording", "typical_step_s", 1.06e-3, "is 1 ms: add --set sample_period=0.00106."),
+        ("recording", "typical_step_s", 0.94e-3, "Samples come every 0.94 ms"),
     ],
 )
 def test_the_verdict_begins_with_what_is_wrong(
@@ -374,7 +374,7 @@ def test_the_verdict_begins_with_what_is_wrong(
     summary = replay[1]
     assert words not in verdict(of(ReplaySummary, summary))
     assert words in verdict(of(ReplaySummary, summary | {part: summary[part] | {key: value}}))
-    for step in (0.71e-3, 1.39e-3, 0.0):
+    for step in (0.96e-3, 1.04e-3, 0.0):
         recording = summary["recording"] | {"typical_step_s": step}
         assert "Samples come" not in verdict(of(ReplaySummary, summary | {"recording": recording}))
 

@@ -37,6 +37,21 @@ def test_the_typical_step_is_that_of_most_samples() -> None:
     assert seconds(2 * recorded[there], 2 * sender[there])[1].typical_step_us == 2000
 
 
+@pytest.mark.parametrize("rate", [0.5, 0.8, 0.94, 0.97, 1.0, 1.03, 1.1, 1.3, 2.0])
+@pytest.mark.parametrize("lost", [0, 10])
+def test_a_rate_that_differs_by_some_per_cent_is_told_from_lost_samples(rate: float, lost: int) -> None:
+    recorded, sender = steady(1000)
+    there = np.arange(1000) % 100 >= lost
+    found = seconds((rate * recorded[there]).astype(np.int64), (rate * sender[there]).astype(np.int64))[1]
+    assert found.typical_step_us == pytest.approx(1000.0 * rate, rel=0.01 if rate >= 1.0 or not lost else 0.11)
+
+
+@pytest.mark.parametrize("steps", [[1.0], [1.4, 0.6], [0.8, 0.8, 0.8, 1.6], [1.3, 0.7, 1.0], [1.6, 0.4]])
+def test_steps_that_are_right_in_the_mean_are_no_other_rate(steps: list[float]) -> None:
+    sender = np.cumsum(np.tile(1000.0 * np.array(steps), 300)).astype(np.int64)
+    assert seconds(START + sender, sender)[1].typical_step_us == pytest.approx(1000.0, abs=1.0)
+
+
 def test_32_bits_that_wrap_go_on() -> None:
     time, timeline = seconds(*steady(2000, WRAP - 1_000_000), 3)
     np.testing.assert_array_equal(time, np.arange(2000) / 1000)

@@ -44,7 +44,6 @@ static void surprise(double ratio, uint32_t samples)
 /* The end of a block of an arm that is known. */
 static void end_block(void)
 {
-    evidence.periods += (uint32_t)SAMPLES;
     const evidence_block_t block = {
         .setup = &setup, .period = (float)SAMPLES * PERIOD, .known = true, .verdict = (uint8_t)VERDICT_REST};
     evidence_end_block(&evidence, &cdkf, &block);
@@ -177,11 +176,24 @@ static bool is_spike(uint32_t i, float sigmas, float level)
 TEST(a_rate_before_an_outage_says_nothing_of_motion_after_it)
 {
     evidence_start(&evidence);
-    evidence_add_motion(&evidence, 1u, 1.0f, 0.001f, 1.0f);
-    evidence_add_motion(&evidence, 1u, 1.0f, TRIM_OUTAGE, 1.0f);
+    evidence_add_motion(&evidence, 1u, 1.0f, 0.001f, &config.settings);
+    evidence_add_motion(&evidence, 1u, 1.0f, TRIM_OUTAGE, &config.settings);
     TEST_ASSERT_TRUE((evidence.motion.fast == 0.0f) && (evidence.motion.slow == 0.0f));
-    evidence_add_motion(&evidence, 1u, 1.0f, 0.001f, 1.0f);
+    evidence_add_motion(&evidence, 1u, 1.0f, 0.001f, &config.settings);
     TEST_ASSERT_TRUE((evidence.motion.fast > 0.0f) && (evidence.motion.slow > 0.0f));
+}
+
+/* Samples of the longest sample_period that come a little late. */
+TEST(a_sample_that_follows_the_last_one_says_something_of_motion)
+{
+    static const float elapsed[] = {0.021f, 0.029f, 0.031f};
+    config.settings.sample_period = 0.02f;
+    for (uint32_t k = 0u; k < 3u; k++) {
+        evidence_start(&evidence);
+        evidence_add_motion(&evidence, 1u, 1.0f, elapsed[k], &config.settings);
+        evidence_add_motion(&evidence, 1u, 1.0f, elapsed[k], &config.settings);
+        TEST_ASSERT_EQUAL(k < 2u, evidence.motion.slow > 0.0f);
+    }
 }
 
 TEST(an_output_beyond_eight_standard_deviations_is_refused)
@@ -510,9 +522,10 @@ static float clock_until(bool wanted, uint32_t periods, float rate)
             .period = rate * ((float)periods * PERIOD),
             .known = true,
             .verdict = (uint8_t)VERDICT_REST};
-        evidence.periods = periods;
+        for (uint32_t k = 0u; k < periods; k++) {
+            evidence_add_time(&evidence, rate * PERIOD, PERIOD, 1u);
+        }
         evidence_end_block(&evidence, &cdkf, &block);
-        TEST_ASSERT_EQUAL_UINT32(0u, evidence.periods);
         time += block.period;
     }
     return time;
@@ -535,6 +548,26 @@ TEST(a_clock_at_another_rate_shows_within_half_a_second)
             evidence_show(&evidence);
             TEST_ASSERT_EQUAL_HEX32(LEVER_FAULT_CALIBRATION, evidence.faults);
             TEST_ASSERT_TRUE(clock_until(false, periods[k], 1.0f) < 1.0f);
+        }
+    }
+}
+
+/* Intervals as a clock of low resolution, or a sender that is late now and then, has them [sample_period]; lost samples. */
+/* R30 */
+TEST(intervals_that_are_right_in_the_mean_are_no_clock_at_another_rate)
+{
+    static const float patterns[][4] = {
+        {0.8f, 0.8f, 0.8f, 1.6f}, {0.4f, 1.6f, 0.4f, 1.6f}, {0.1f, 1.9f, 1.0f, 1.0f}, {2.0f, 1.0f, 3.0f, 1.0f}};
+    for (uint32_t i = 0u; i < (sizeof patterns / sizeof patterns[0]); i++) {
+        setUp();
+        for (uint32_t block = 0u; block < 200u; block++) {
+            for (uint32_t k = 0u; k < 4u; k++) {
+                const float interval = patterns[i][k];
+                const float periods = (interval > 1.5f) ? floorf(interval + 0.5f) : 1.0f;
+                evidence_add_time(&evidence, interval * PERIOD, PERIOD, (uint32_t)periods);
+            }
+            end_block();
+            TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_CLOCK));
         }
     }
 }

@@ -22,6 +22,11 @@ const fmu_variable_t model_variable[] = {
 #endif
 };
 
+/* One of each for each of the enumeration. */
+typedef char fmu_has_every_variable[((sizeof model_variable / sizeof model_variable[0]) == MODEL_VARIABLES) ? 1 : -1];
+typedef char
+    fmu_has_every_start[((sizeof model_start_value / sizeof model_start_value[0]) == MODEL_VARIABLES) ? 1 : -1];
+
 #ifdef CONTROLLER_AIRCRAFT
 static const lever_aircraft_t aircraft = CONTROLLER_AIRCRAFT;
 #endif

@@ -23,8 +23,8 @@ enum {
 
 enum {
     FIRST_BUS = (int)FIRST_SETTING + (int)SETTINGS,
-#ifdef FMU_EVENTS
     BEFORE_BUS = FIRST_BUS - 1,
+#ifdef FMU_EVENTS
 #define FMU_VARIABLE(name, type, role, unit, start, meaning) AT_##name,
 #include "controller_bus.def"
 #endif
