@@ -80,16 +80,10 @@ def cluster(folder: Path) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
 class TestKilled:
-    def test_a_worker(self, small_file: Path, undisturbed: dict[str, bytes], tmp_path: Path) -> None:
-        client = begin(small_file, "-o", tmp_path, "--workers", "1")
-        until(lambda: len(files(tmp_path)) >= 2, client)
-        os.kill(workers(client.pid)[0], signal.SIGKILL)
-        out, err = client.communicate(timeout=PATIENCE)
-        assert client.returncode == 0, err
-        assert files(tmp_path) == undisturbed
-        assert "48 runs, 0 failed" in out
-
-    def test_the_client(self, small_file: Path, undisturbed: dict[str, bytes], tmp_path: Path, lever: Run) -> None:
+    def test_the_client_and_then_a_worker(
+        self, small_file: Path, undisturbed: dict[str, bytes], tmp_path: Path, lever: Run
+    ) -> None:
+        """The campaign is resumed by another client, whose worker is replaced."""
         client = begin(small_file, "-o", tmp_path, "--workers", "1")
         until(lambda: len(files(tmp_path)) >= 2, client)
         children = workers(client.pid)
@@ -104,7 +98,12 @@ class TestKilled:
         assert 2 <= len(kept) < len(undisturbed)
         assert "add --resume" in lever("campaign", small_file, "-o", tmp_path)[2]
         written = {name: (tmp_path / name).stat().st_mtime_ns for name in kept}
-        assert "48 runs, 0 failed" in lever("campaign", small_file, "-o", tmp_path, "--workers", "1", "--resume")[1]
+        another = begin(small_file, "-o", tmp_path, "--workers", "1", "--resume")
+        until(lambda: len(files(tmp_path)) >= len(kept) + 2, another)
+        os.kill(workers(another.pid)[0], signal.SIGKILL)
+        out, err = another.communicate(timeout=PATIENCE)
+        assert another.returncode == 0, err
+        assert "48 runs, 0 failed" in out
         assert files(tmp_path) == undisturbed
         assert {name: (tmp_path / name).stat().st_mtime_ns for name in kept} == written
         assert list(tmp_path.glob(".*")) == []
