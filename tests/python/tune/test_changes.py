@@ -18,7 +18,7 @@ TRUTH = {"z_ddot_gain": 1.0, "z_ddot_delay": 4e-3, "lever_friction": 0.3}
 
 @pytest.fixture(scope="module")
 def regripped(simulate: Simulate) -> Path:
-    """A minute, of which the arm is half as strong again in the second half."""
+    """Return a minute, in the second half of which the arm is half as strong again."""
     return simulate(60.0, regrip=True, delay=TRUTH["z_ddot_delay"], friction=TRUTH["lever_friction"])
 
 
