@@ -251,12 +251,12 @@ void evidence_start_calibration(evidence_t *evidence)
     evidence_set(evidence, EVIDENCE_CALIBRATION, 0.0f);
 }
 
-/* How far the gain of measured over expected is from 1, less `sure` times what else is measured, both rms. */
-static float agreement_away(const agreement_t *agreement, float sure)
+/* How far the gain of measured over expected is from 1. `other` becomes what else is measured over what is expected, rms. */
+static float agreement_away(const agreement_t *agreement, float *other)
 {
     const float gain = agreement->product / agreement->expected;
-    const float other = (agreement->measured / agreement->expected) - (gain * gain); /* in squares */
-    return fabsf(gain - 1.0f) - (sure * sqrtf(greater(other, 0.0f)));
+    *other = sqrtf(greater((agreement->measured / agreement->expected) - (gain * gain), 0.0f));
+    return fabsf(gain - 1.0f);
 }
 
 static void agreement_forget(agreement_t *agreement, float keep)
@@ -269,9 +269,10 @@ static void agreement_forget(agreement_t *agreement, float keep)
 static void judge_motor(evidence_t *evidence, float period, float sample_period)
 {
     const float least = TORQUE_MIN * (AGREEMENT_MEMORY / ((float)EVIDENCE_TORQUE_EVERY * sample_period));
-    const bool says = (evidence->torque.expected > least);
-    evidence_set(evidence, EVIDENCE_MOTOR, says ? agreement_away(&evidence->torque, TORQUE_SURE) : 0.0f);
-    evidence_set(evidence, EVIDENCE_TORQUE_GAIN, says ? agreement_away(&evidence->torque, TORQUE_GAIN_SURE) : 0.0f);
+    float other = 0.0f;
+    const float away = (evidence->torque.expected > least) ? agreement_away(&evidence->torque, &other) : 0.0f;
+    evidence_set(evidence, EVIDENCE_MOTOR, away - (TORQUE_SURE * other));
+    evidence_set(evidence, EVIDENCE_TORQUE_GAIN, away - (TORQUE_GAIN_SURE * other));
     agreement_forget(&evidence->torque, 1.0f - share_of(period, AGREEMENT_MEMORY));
 }
 
@@ -305,7 +306,9 @@ static void judge_kinematics(evidence_t *evidence, float period, float sample_pe
         const float inverse = of->fourth / blocks;
         const float sure = (KINEMATICS_SURE * sqrtf(inverse)) / (1.0f - (2.0f * inverse));
         of->unheard = 0.0f;
-        evidence_set(evidence, EVIDENCE_KINEMATICS, agreement_away(&of->agreement, sure));
+        float other;
+        const float away = agreement_away(&of->agreement, &other);
+        evidence_set(evidence, EVIDENCE_KINEMATICS, away - (sure * other));
     } else { /* it stays as it is, for a while */
         of->unheard += period;
         if (of->unheard > LAPSE) {

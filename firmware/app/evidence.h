@@ -152,11 +152,18 @@ static inline bool evidence_repeats(const evidence_t *evidence, enum signal sign
 /* Output y, which is not valid where it is refused. The squares of innovations are now `level` times those expected. */
 bool evidence_refuses_output(evidence_t *evidence, const cdkf_t *cdkf, uint32_t i, float y, float level, float elapsed);
 
-/* A sample `elapsed` after the last, by its clock, where so many of `period` have passed, if others were lost [s]. */
-static inline void evidence_add_time(evidence_t *evidence, float elapsed, float period, uint32_t periods)
+/* A sample `elapsed` after the last, by its clock [s]; */
+static inline void evidence_add_time(evidence_t *evidence, float elapsed, float period)
 {
-    evidence->slow += elapsed - (period * (float)periods);
-    evidence->fast += period - elapsed;
+    const float early = period - elapsed;
+    evidence->fast += early;
+    evidence->slow -= early;
+}
+
+/* and so many that were lost before it, if that is why it comes late. */
+static inline void evidence_add_lost(evidence_t *evidence, float period, uint32_t lost)
+{
+    evidence->slow -= period * (float)lost;
 }
 
 /* The torque that was commanded before this sample [N m], by each. */

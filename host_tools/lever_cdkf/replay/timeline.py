@@ -89,8 +89,9 @@ class Timeline:
 
 
 def _typical(steps: IntArray, period: float) -> float:
-    """Return the step of most samples; where that is near the period, of the mean, as the firmware judges a clock: the
-    period, unless steps are longer though each long one is that of lost samples, or shorter though none is.
+    """Return the step of most samples or, where that is near the period, the mean one as the firmware judges a clock.
+
+    That is the period, unless steps are longer though each long one is that of lost samples, or shorter though none is.
     """
     most = float(np.median(steps))
     if not 0.7 < most / period < 1.4:

@@ -138,7 +138,7 @@ def _compare(args: argparse.Namespace) -> int:
     if not todo:
         raise LeverError("none of these estimators takes part in any of these cases; see `lever compare --list`")
     if idle := [name for name in args.estimators or () if name not in {task.entrant for task in todo}]:
-        warn(f"{', '.join(idle)}: not run, as none of these cases has it; `lever compare --list` has what runs together")
+        warn(f"not run, as none of these cases has it: {', '.join(idle)}; see `lever compare --list`")
     if args.out is not None:
         make_folder(args.out)  # before a campaign that could then not be kept
     with Progress("compare") as progress:

@@ -523,7 +523,7 @@ static float clock_until(bool wanted, uint32_t periods, float rate)
             .known = true,
             .verdict = (uint8_t)VERDICT_REST};
         for (uint32_t k = 0u; k < periods; k++) {
-            evidence_add_time(&evidence, rate * PERIOD, PERIOD, 1u);
+            evidence_add_time(&evidence, rate * PERIOD, PERIOD);
         }
         evidence_end_block(&evidence, &cdkf, &block);
         time += block.period;
@@ -564,7 +564,8 @@ TEST(intervals_that_are_right_in_the_mean_are_no_clock_at_another_rate)
             for (uint32_t k = 0u; k < 4u; k++) {
                 const float interval = patterns[i][k];
                 const float periods = (interval > 1.5f) ? floorf(interval + 0.5f) : 1.0f;
-                evidence_add_time(&evidence, interval * PERIOD, PERIOD, (uint32_t)periods);
+                evidence_add_time(&evidence, interval * PERIOD, PERIOD);
+                evidence_add_lost(&evidence, PERIOD, (uint32_t)periods - 1u);
             }
             end_block();
             TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_CLOCK));
