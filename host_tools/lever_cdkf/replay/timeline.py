@@ -93,8 +93,8 @@ def _typical(steps: IntArray, period: float) -> float:
 
     That is the period, unless steps are longer though each long one is that of lost samples, or shorter though none is.
     """
-    most = float(np.median(steps))
-    if not 0.7 < most / period < 1.4:
+    most, mean = float(np.median(steps)), float(steps.mean())
+    if not 0.7 < most / period < 1.4 and abs(mean - period) > 0.05 * period:
         return most
     longer = float(steps.sum() / np.maximum(np.rint(steps / period), 1.0).sum())
-    return longer if longer > period else min(float(steps.mean()), period)
+    return longer if longer > period else min(mean, period)
