@@ -252,6 +252,24 @@ TEST(a_covariance_that_is_none_a_negative_square_or_time_and_points_that_are_not
     TEST_ASSERT_TRUE(lever_state_restore(other, state));
 }
 
+/* Another machine may round them otherwise. */
+/* R53 */
+TEST(parameters_are_those_of_the_belief_to_a_thousandth)
+{
+    static const float factor[] = {1.0005f, 0.9995f, 1.002f, 0.998f};
+    start_bus();
+    fly(50u);
+    float *const member[] = {&lever->estimator.cdkf.p[0], &lever->estimator.cdkf.p[2]};
+    for (uint32_t i = 0u; i < 8u; i++) {
+        float *value = member[i / 4u];
+        const float kept = *value;
+        *value *= factor[i % 4u];
+        lever_state_save(lever, state);
+        TEST_ASSERT_EQUAL((i % 4u) < 2u, lever_state_restore(lever_init(&other_memory, &config), state));
+        *value = kept;
+    }
+}
+
 /* Numbers that are none, and too large ones, in each signal of the last sample, whether its sender calls it valid or not.
  */
 /* R53 */

@@ -168,9 +168,9 @@ TEST(it_goes_on_through_gaps)
 /* In parts of at most 20 ms. */
 TEST(a_long_step_is_taken_in_parts)
 {
-    static const float period[] = {0.02f, 0.021f, 0.05f, 0.1f};
-    static const uint32_t parts[] = {1u, 2u, 3u, 5u};
-    for (uint32_t i = 0u; i < 4u; i++) {
+    static const float period[] = {0.02f, 0.021f, 0.035f, 0.05f, 0.1f};
+    static const uint32_t parts[] = {1u, 2u, 2u, 3u, 5u};
+    for (uint32_t i = 0u; i < 5u; i++) {
         involuntary_t whole;
         model_step_t step = about;
         step.z_ddot = 2.0f;

@@ -274,6 +274,17 @@ TEST(a_table_is_accepted_to_the_last_of_its_limits)
     aircraft.frequency[0] = 0.5f;
     aircraft.real[0] = NAN;
     TEST_ASSERT_FALSE(margin_accepts(&aircraft));
+    aircraft.real[0] = 1.0f;
+    aircraft.seat_modes = 1u;
+    aircraft.seat[0].damping = 0.1f;
+    aircraft.seat[0].stiffness = 0.1f;
+    TEST_ASSERT_TRUE(margin_accepts(&aircraft));
+    aircraft.seat[0].damping = 0.0f;
+    TEST_ASSERT_FALSE(margin_accepts(&aircraft));
+    aircraft.seat[0].damping = 0.1f;
+    aircraft.seat[0].stiffness = 0.0f;
+    TEST_ASSERT_FALSE(margin_accepts(&aircraft));
+    aircraft.seat_modes = 0u;
     for (uint32_t i = 0u; i < (uint32_t)LEVER_AIRCRAFT_POINTS; i++) {
         aircraft.frequency[i] = 1.0f + (float)i;
         aircraft.real[i] = 1.0f;

@@ -549,6 +549,18 @@ TEST(one_correction_fades_before_the_other_begins)
 }
 
 /* Of 20 ms, the longest sample period there is. */
+TEST(after_a_tenth_of_a_second_without_a_sample_it_begins_anew)
+{
+    static const float period[] = {0.09f, 0.12f};
+    for (uint32_t k = 0u; k < 2u; k++) {
+        setUp();
+        run(3000u);
+        sample.step.period = period[k];
+        (void)mitigation_step(&mitigation, &config.settings, &sample);
+        TEST_ASSERT_EQUAL(k == 1u, now().weight == 0.0f);
+    }
+}
+
 TEST(with_slow_samples_it_is_passive_in_time_too)
 {
     sample.silence_us = 25000u;

@@ -55,6 +55,22 @@ TEST(bounds_are_those_of_the_model_on_either_scale_or_the_guess_where_that_is_ou
     }
 }
 
+TEST(a_pair_is_so_far_from_the_parameters_on_either_side)
+{
+    static const float offset[L] = {0.0f, 1.0f, -0.25f};
+    for (uint32_t scale = 0u; scale < 2u; scale++) {
+        float plus[L];
+        float minus[L];
+        start(scale);
+        scaling_pair(&scaling, priors[scale].guess, offset, plus, minus);
+        for (uint32_t i = 0u; i < (uint32_t)L; i++) {
+            const double tolerance = 3.0e-6 * fabs((double)priors[scale].guess[i]) * ((scale == 0u) ? 3.0 : 100.0);
+            TEST_ASSERT_DOUBLE_WITHIN(tolerance, parameter_at(i, (double)offset[i]), (double)plus[i]);
+            TEST_ASSERT_DOUBLE_WITHIN(tolerance, parameter_at(i, -(double)offset[i]), (double)minus[i]);
+        }
+    }
+}
+
 TEST(w_is_kept_within_its_bounds)
 {
     start(0u);
