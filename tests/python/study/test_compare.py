@@ -569,6 +569,16 @@ def test_list(lever: Run) -> None:
     assert all(name in out for name in (*cases(), *BASELINES))
 
 
+def test_who_is_left_out_is_named_and_what_is_not_drawn_is_not(lever: Run, tmp_path: Path) -> None:
+    chosen = ("--scenarios", "steady", "--estimators", "dual", "rls", "--seeds", "1", "--duration", "1", "--jobs", "1")
+    status, said, err = lever("compare", *chosen, "--out", tmp_path)
+    assert status == 0
+    assert "lever: warning: not run, as none of these cases has it: dual; see `lever compare --list`\n" in err
+    made = "compare.html, compare.csv, provenance.json"
+    assert said.endswith(f"Written to {tmp_path}: {made}\n")
+    assert {path.name for path in tmp_path.iterdir()} == set(made.split(", "))
+
+
 def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two cases in two processes; the same figures as in one process."""
     chosen = ("--scenarios", "lever_fixed_dither_rough", "step_up", "--estimators", "joint", "dual_shipped", "rls")
