@@ -305,13 +305,14 @@ static void advance(estimator_t *estimator, checked_t *sample, const inputs_t *l
 /* A sample `elapsed` seconds after the last one. */
 static void step(estimator_t *estimator, checked_t *sample, const inputs_t *last, float elapsed)
 {
+    const float period = estimator->setup.settings->sample_period;
     const uint32_t periods = periods_in(estimator, elapsed);
-    evidence_add_time(&estimator->learning.evidence, elapsed, estimator->setup.settings->sample_period);
+    evidence_add_time(&estimator->learning.evidence, elapsed, period);
     estimator->trim.unsettled -= elapsed; /* before this sample may set it */
-    note(estimator, elapsed < (CLOCK_MIN * estimator->setup.settings->sample_period), LEVER_FAULT_CLOCK);
+    note(estimator, elapsed < (CLOCK_MIN * period), LEVER_FAULT_CLOCK);
     if (periods > 1u) {
         estimator->lost += periods - 1u;
-        evidence_add_lost(&estimator->learning.evidence, estimator->setup.settings->sample_period, periods - 1u);
+        evidence_add_lost(&estimator->learning.evidence, period, periods - 1u);
         note(estimator, true, LEVER_FAULT_GAP);
     }
     if (estimator->mode != LEVER_MODE_FAULT) { /* only a reset leaves it */

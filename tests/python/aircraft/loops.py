@@ -16,7 +16,7 @@ from lever_sil.aircraft.tabulated import Tabulated
 
 _POINTS = 1000
 _HALVINGS = 16
-"""Of a step of the grid, 0.2 % of its frequency: to 3e-8 of it."""
+"""A step of the grid is 0.2 % of its frequency; halved so often, it is 3e-8 of it."""
 
 
 def loop_of(coupled: Coupled | Tabulated, transfer: Transfer, row: int) -> Response:
