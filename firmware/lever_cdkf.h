@@ -131,10 +131,10 @@ uint32_t lever_settings_crc(const lever_settings_t *settings);
 
 /* --- life ------------------------------------------------------------------------------------------------------ */
 
-/* Room for one instance: 2,464 bytes, and as much more as pointers are longer than 32 bits. */
+/* Room for one instance: 2,464 bytes, and 24 more where pointers have 64 bits. */
 typedef struct lever_room {
-    const void *pointers[4];
-    uint8_t rest[2448];
+    const void *pointers[6];
+    uint8_t rest[2440];
 } lever_room_t;
 typedef union lever_memory {
     uint64_t aligned;
@@ -481,7 +481,7 @@ bool lever_next_frame(lever_t *lever, lever_frame_t *frame);
 /* The state of an instance as bytes, lowest first, the same on every machine: what its future depends on besides its
  * configuration, its aircraft and what it is given. Neither is called by anything else here, so that an image without
  * them is not larger for it. */
-enum lever_state_limits { LEVER_STATE_BYTES = 2162 };
+enum lever_state_limits { LEVER_STATE_BYTES = 2174 };
 
 /* Which members the state has, of which version of the firmware; bytes with another number cannot be restored. */
 uint16_t lever_state_layout(void);

@@ -18,9 +18,9 @@ typedef struct bounce {
     uint8_t state;                    /* enum lever_bounce */
     uint8_t same;                     /* of enum bounce_same: what the last sample measured as the one before */
     bool mitigates;                   /* one is chosen, or still fades */
-    uint32_t time_us;                 /* of the sample with which the margin was worked out */
     const lever_aircraft_t *aircraft; /* NULL: none */
     margin_t margin;
+    uint32_t time_us; /* of the sample with which it was worked out */
 } bounce_t;
 
 /* Chooses an enum lever_mitigation; LEVER_KEEP changes nothing. */

@@ -119,7 +119,7 @@ static void check(
     evidence_t *evidence = &estimator->learning.evidence;
     const bool theta = is_usable(estimator, sample->theta, sample->theta_valid, MODEL_THETA_MOST);
     const bool theta_dot = is_usable(estimator, sample->theta_dot, sample->theta_dot_valid, OTHER_MAX);
-    const bool successive = (elapsed > 0.0f) && (elapsed < (1.5f * estimator->setup.settings->sample_period));
+    const bool successive = (elapsed > 0.0f) && is_successive(elapsed, estimator->setup.settings->sample_period);
     const bool measured = is_usable(estimator, sample->tau_m, sample->tau_m_valid, OTHER_MAX);
     const float tau_m = sample->tau_m * estimator->setup.torque_scale;
     const bool torque_jumped =
@@ -191,7 +191,7 @@ static void add_motion(estimator_t *estimator, const checked_t *sample, float el
             const float angle = rate - (estimator->setup.constants.trim ? 0.0f : trim_angle(&estimator->trim));
             rate = (RATE_OF_ANGLE * estimator->trim.corner) * angle;
         }
-        evidence_add_motion(&estimator->learning.evidence, i, rate, elapsed, estimator->setup.settings);
+        evidence_add_motion(&estimator->learning.evidence, i, rate, elapsed, estimator->setup.settings->sample_period);
     }
 }
 
@@ -213,12 +213,9 @@ static bool note_states(estimator_t *estimator, const checked_t *sample)
     evidence_t *evidence = &estimator->learning.evidence;
     const lever_settings_t *s = estimator->setup.settings;
     const bool measured = sample->valid[0] || sample->valid[1];
-    const bool rests = evidence_is_at_rest(evidence, s->excitation_least, estimator->cdkf.output_noise[1]);
     evidence_note(evidence, EVIDENCE_MISSING,
         !measured || (estimator->base_missing > 0.0f) || (estimator->torque_missing > 0.0f));
     evidence_note(evidence, EVIDENCE_UNSETTLED, estimator->trim.unsettled >= (0.5f * s->sample_period));
-    evidence_note(evidence, EVIDENCE_REST, rests);
-    note(estimator, rests, LEVER_FAULT_EXCITATION);
     return measured;
 }
 
@@ -242,7 +239,7 @@ static void update_filter(estimator_t *estimator, const checked_t *sample, float
     estimator->nis_size = (uint8_t)((sample->valid[0] ? 1u : 0u) + (sample->valid[1] ? 1u : 0u));
     if (estimator->nis_size != 0u) {
         const float ratio = (estimator->nis_size == 2u) ? (0.5f * estimator->nis) : estimator->nis;
-        evidence_add_nis(evidence, ratio, elapsed, estimator->setup.settings->excitation_time);
+        evidence_add_nis(evidence, ratio);
     }
 }
 
@@ -251,13 +248,13 @@ static void correct(estimator_t *estimator, const checked_t *sample, float elaps
     learning_t *learning = &estimator->learning;
     const bool measured = note_states(estimator, sample);
     update_filter(estimator, sample, elapsed);
+    add_motion(estimator, sample, elapsed);
     const bool learnt = learning_step(learning, &estimator->setup, &estimator->cdkf, estimator->frozen, elapsed);
     if (learning->levels) {
         learning->levels = false;
         alignment_begin_grip(estimator, sample);
     }
     restart_if_invalid(estimator, sample, learnt);
-    add_motion(estimator, sample, elapsed);
     if (estimator->restarts > 0.0f) {
         estimator->restarts -= estimator->restarts * lesser(elapsed * RESTARTS_FORGOTTEN, 1.0f);
     }
@@ -271,7 +268,7 @@ static uint32_t periods_in(const estimator_t *estimator, float elapsed)
 {
     const float period = estimator->setup.settings->sample_period;
     uint32_t periods = 1u;
-    if (elapsed > (1.5f * period)) {
+    if (!is_successive(elapsed, period)) {
         const float rounded = (elapsed / period) + 0.5f;
         periods = (uint32_t)rounded;
     }

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define NIS_TIME 0.1f           /* of nis_fast, and of motion.fast [s] */
-#define NIS_MAX 100.0f          /* of a single sample, so that the means recover */
+#define NOISE_LIKE_MOTION 0.2f  /* of the noise of theta_dot, in squares: a mean of products by chance */
 #define SURPRISED 1.3f          /* nis_fast with which a signal that stands still is stuck; in flight it is 1 +- 0.07 */
 #define ALIVE 0.4f              /* a base acceleration that changed for so long never stands still [s] */
 #define BASE_MEMORY 0.5f        /* [s], */
@@ -89,6 +89,8 @@ void evidence_start(evidence_t *evidence)
     evidence->nis_slow = 1.0f;
     change_detection_init(&evidence->change);
     hands_start(&evidence->hands);
+    evidence_note(evidence, EVIDENCE_REST, true); /* nothing is learnt before the lever is seen to move */
+    evidence_show(evidence);
 }
 
 void evidence_set(evidence_t *evidence, enum evidence_id which, float statistic)
@@ -145,7 +147,7 @@ void evidence_add_outputs(evidence_t *evidence, const float last[CDKF_OUTPUTS], 
     kinematics_t *of = &evidence->kinematics;
     const float turn = KINEMATICS_CORNER * elapsed;
     const float change[2] = {y[0] - last[0], (0.5f * elapsed) * (y[1] + last[1])};
-    const bool on = both && evidence->paired && (elapsed < greater(1.5f * period, KINEMATICS_LINE)) &&
+    const bool on = both && evidence->paired && (is_successive(elapsed, period) || (elapsed < KINEMATICS_LINE)) &&
                     (fabsf(change[0] - change[1]) < KINEMATICS_STEP);
     for (uint32_t i = 0u; i < 2u; i++) { /* y of an output that is not valid may be NaN */
         const float passed = on ? ((1.0f - turn) * (of->passed[i] + change[i])) : 0.0f;
@@ -157,27 +159,40 @@ void evidence_add_outputs(evidence_t *evidence, const float last[CDKF_OUTPUTS], 
     evidence->paired = both;
 }
 
-void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time)
-{
-    const float bounded = lesser(ratio, NIS_MAX);
-    evidence->nis_fast += lesser(elapsed * (1.0f / NIS_TIME), 1.0f) * (bounded - evidence->nis_fast);
-    if (!evidence_has(evidence, EVIDENCE_UNSETTLED)) { /* innovations are those of the filter, not of the levels */
-        evidence->nis_slow += share_of(elapsed, slow_time) * (bounded - evidence->nis_slow);
-    }
-}
+/* --- at the end of a block ---------------------------------------------------------------------------------------- */
 
-void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, const lever_settings_t *s)
+/* The means of what is measured: of the innovations, and of the motion. */
+static void follow_outputs(evidence_t *evidence, float period, float slow_time)
 {
     motion_t *motion = &evidence->motion;
-    const float square = rate * motion->last[i];
-    motion->last[i] = rate;
-    if ((elapsed < TRIM_OUTAGE) || (elapsed < (1.5f * s->sample_period))) {
-        motion->slow = greater(motion->slow + (share_of(elapsed, s->excitation_time) * (square - motion->slow)), 0.0f);
-        motion->fast += lesser(elapsed * (1.0f / NIS_TIME), 1.0f) * (square - motion->fast);
+    if (evidence->measured > 0.0f) {
+        const float each = 1.0f / evidence->measured;
+        const float nis = each * evidence->nis_sum;
+        const float square = each * motion->sum;
+        const float slow = share_of(period, slow_time);
+        const float fast = share_of(period, NIS_TIME);
+        evidence->nis_fast += fast * (nis - evidence->nis_fast);
+        if (!evidence_has(evidence, EVIDENCE_UNSETTLED)) { /* innovations are those of the filter, not of the levels */
+            evidence->nis_slow += slow * (nis - evidence->nis_slow);
+        }
+        motion->slow = greater(motion->slow + (slow * (square - motion->slow)), 0.0f);
+        motion->fast += fast * (square - motion->fast);
     }
+    evidence->measured = 0.0f;
+    evidence->nis_sum = 0.0f;
+    motion->sum = 0.0f;
 }
 
-/* --- at the end of a block ---------------------------------------------------------------------------------------- */
+/* Whether there is too little motion to learn from, beyond what the noise of theta_dot looks like. */
+static bool judge_motion(evidence_t *evidence, const lever_settings_t *s, float noise, float period)
+{
+    const motion_t *motion = &evidence->motion;
+    const float least = (s->excitation_least * s->excitation_least) + (NOISE_LIKE_MOTION * (noise * noise));
+    const bool rests = (motion->slow < least) || (motion->fast < (0.25f * least));
+    evidence->awake = rests ? 0.0f : lesser(evidence->awake + period, AWAKE);
+    evidence_note(evidence, EVIDENCE_REST, evidence->awake < (AWAKE - 0.001f));
+    return rests;
+}
 
 static void judge_stillness(evidence_t *evidence, enum signal signal, float period)
 {
@@ -338,8 +353,6 @@ static void judge_noise(evidence_t *evidence, const evidence_block_t *block)
 static void judge_states(evidence_t *evidence, const cdkf_t *cdkf, const evidence_block_t *block)
 {
     const float since = evidence->since_change;
-    evidence->awake = evidence_has(evidence, EVIDENCE_REST) ? 0.0f : lesser(evidence->awake + block->period, AWAKE);
-    evidence_note(evidence, EVIDENCE_REST, evidence->awake < (AWAKE - 0.001f));
     evidence_note(evidence, EVIDENCE_REGRIP, since < REGRIP_TIME);
     evidence->offset = block->held ? evidence->offset : 0.0f;
     evidence_note(evidence, EVIDENCE_OFFSET, fabsf(evidence->offset) > OFFSET_MAX);
@@ -354,8 +367,10 @@ void evidence_end_block(evidence_t *evidence, const cdkf_t *cdkf, const evidence
     const setup_t *setup = block->setup;
     const float period = block->period;
     const bool adapts = verdict_rows[block->verdict].adapt;
-    const bool moves = !evidence_has(evidence, EVIDENCE_MISSING) && !evidence_has(evidence, EVIDENCE_UNSETTLED) &&
-                       !evidence_has(evidence, EVIDENCE_REST);
+    follow_outputs(evidence, period, setup->settings->excitation_time);
+    const bool rests = judge_motion(evidence, setup->settings, cdkf->output_noise[1], period);
+    const bool moves =
+        !rests && !evidence_has(evidence, EVIDENCE_MISSING) && !evidence_has(evidence, EVIDENCE_UNSETTLED);
     const score_t sudden = cdkf_sudden_score(cdkf);
     float force = 0.0f;
     evidence->since_change = lesser(evidence->since_change + period, EVIDENCE_LONG_AGO);

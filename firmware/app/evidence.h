@@ -24,6 +24,7 @@
 #include "filter/sticking.h"
 #include "filter/trim.h"
 #include "filter/whiteness.h"
+#include "math/elapsed.h"
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -55,7 +56,8 @@ typedef struct kinematics {
 } kinematics_t;
 
 typedef struct motion {
-    float slow;               /* mean square over excitation_time [rad^2/s^2], */
+    float sum;                /* of the products of successive rates in this block [rad^2/s^2]; */
+    float slow;               /* their mean over excitation_time, */
     float fast;               /* and over 0.1 s */
     float last[MODEL_STATES]; /* deviations of the last sample that measured each output, as a rate [rad/s] */
     float base_slow;          /* mean square change of the base acceleration in a block over 1 s [m^2/s^4], */
@@ -67,7 +69,9 @@ typedef struct evidence {
     uint32_t present;               /* a bit each */
     uint32_t faults;                /* of enum lever_fault, that it shows as at the end of a block */
     float since_change;             /* time since the pilot changed last [s] */
-    float nis_fast;                 /* mean of nis / nis_size over 0.1 s; expected 1, */
+    float measured;                 /* samples of this block with an output, */
+    float nis_sum;                  /* sum of their nis / nis_size, which is expected to be 1; */
+    float nis_fast;                 /* its mean over 0.1 s, */
     float nis_slow;                 /* and over excitation_time */
     motion_t motion;
     stillness_t stillness[SIGNAL_COUNT];
@@ -97,9 +101,9 @@ typedef struct evidence {
     bool opened;             /* the last change was to another pilot */
 } evidence_t;
 
-#define EVIDENCE_NOISE_LIKE_MOTION 0.2f /* of the noise of theta_dot, in squares: a mean of products by chance */
-#define EVIDENCE_LONG_AGO 1.0e3f        /* [s] */
-#define CHANGE_REPORTED 3.0f            /* a change is reported, and its step estimated, until then [s] */
+#define EVIDENCE_NIS_MAX 100.0f  /* of a single sample, so that the means recover */
+#define EVIDENCE_LONG_AGO 1.0e3f /* [s] */
+#define CHANGE_REPORTED 3.0f     /* a change is reported, and its step estimated, until then [s] */
 
 void evidence_start(evidence_t *evidence);
 
@@ -180,19 +184,24 @@ bool evidence_has_other_torque(const evidence_t *evidence);
 void evidence_add_outputs(evidence_t *evidence, const float last[CDKF_OUTPUTS], const float y[CDKF_OUTPUTS], bool both,
     float elapsed, float period);
 
-/* After the update: nis / nis_size of the sample. */
-void evidence_add_nis(evidence_t *evidence, float ratio, float elapsed, float slow_time);
-
-/* The measured rate, or what is presumed of it [rad/s], by output i. As the product of successive samples: unlike
- * motion, the noise of a sensor differs from sample to sample. The prediction is no evidence of motion: the base drives
- * it on a lever that is locked. */
-void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, const lever_settings_t *s);
-
-/* Whether there is motion enough to learn from, beyond what the noise of theta_dot looks like. */
-static inline bool evidence_is_at_rest(const evidence_t *evidence, float least, float noise)
+/* After the update: nis / nis_size of a sample with an output. */
+static inline void evidence_add_nis(evidence_t *evidence, float ratio)
 {
-    const float square = (least * least) + (EVIDENCE_NOISE_LIKE_MOTION * (noise * noise));
-    return (evidence->motion.slow < square) || (evidence->motion.fast < (0.25f * square));
+    evidence->measured += 1.0f;
+    evidence->nis_sum += lesser(ratio, EVIDENCE_NIS_MAX);
+}
+
+/* Of such a sample, the measured rate, or what is presumed of it [rad/s], by output i. As the product of successive
+ * samples: unlike motion, the noise of a sensor differs from sample to sample. The prediction is no evidence of motion:
+ * the base drives it on a lever that is locked. */
+static inline void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, float period)
+{
+    motion_t *motion = &evidence->motion;
+    const float square = rate * motion->last[i];
+    motion->last[i] = rate;
+    if (is_successive(elapsed, period) || (elapsed < TRIM_OUTAGE)) {
+        motion->sum += square;
+    }
 }
 
 /* --- at the end of a block ---------------------------------------------------------------------------------------- */

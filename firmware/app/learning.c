@@ -3,6 +3,8 @@
 #include "math/invariant.h"
 #include "math/share.h"
 
+#include <string.h>
+
 #define KEEP_PERIOD 1.0f      /* between two copies of the belief [s] */
 #define DISTURBANCE 2.0f      /* process noise when the torque is unknown, in noise_range times the one that is set */
 #define DISTURBANCE_TIME 0.4f /* its time constant [s] [hands_off] */
@@ -33,6 +35,7 @@ static void keep(learning_t *learning, const cdkf_t *cdkf, float period, bool no
 static void restore(learning_t *learning, cdkf_t *cdkf)
 {
     cdkf_return(cdkf, &learning->kept[1]);
+    cdkf_end_step(cdkf); /* nor was it a change of the arm */
     learning->kept[0] = learning->kept[1];
     learning->kept_ago = 0.0f;
     noise_estimation_begin(&learning->noise);
@@ -229,7 +232,7 @@ void learning_resume(learning_t *learning, cdkf_t *cdkf)
 void learning_skip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float elapsed)
 {
     evidence_note(&learning->evidence, EVIDENCE_MISSING, false);
-    evidence_note(&learning->evidence, EVIDENCE_REST, true);
+    (void)memset(&learning->evidence.motion, 0, sizeof learning->evidence.motion); /* it rests */
     learning->elapsed += elapsed;
     end_block(learning, setup, cdkf, false);
 }

@@ -38,7 +38,7 @@ bool learning_step(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, boo
 /* The parameters learn again, from now on, after they were held. */
 void learning_resume(learning_t *learning, cdkf_t *cdkf);
 
-/* After `elapsed` seconds without samples: the parameters learn what is pending, and walk for that time. */
+/* After `elapsed` seconds without samples: what is pending is dropped, and the parameters walk for that time. */
 void learning_skip(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, float elapsed);
 
 #endif

@@ -4,10 +4,17 @@
 
 #include "math/bounds.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 /* Times may wrap: one that is less than this after another is the later of the two [us]. */
 #define HALF_TURN_OF_TIME 0x80000000u
+
+/* Whether no sample was lost between two that are so far apart, by their clock. */
+static inline bool is_successive(float elapsed, float sample_period)
+{
+    return elapsed <= (1.5f * sample_period);
+}
 
 /* The nearest number of microseconds. */
 static inline uint32_t microseconds_of(float seconds)

@@ -168,10 +168,7 @@ def stands(flight: Flight) -> list[str]:
     said, present = [], evidence(flight)
     samples, modes = flight.sample[flight.read], flight.modes[flight.read]
     always, ever = _recent(flight)
-    rests, outputs = (flight.faults & EXCITATION) != 0, flight.faults & (THETA | THETA_DOT)
-    rested = (
-        np.convolve(rests, np.ones(BLOCK + READ, int))[: len(rests)] == BLOCK + READ
-    )  # for a block, so that it ends
+    outputs = flight.faults & (THETA | THETA_DOT)
     stood = flight.event.clock_stands & (samples >= flight.begin) & (samples < flight.end + BLOCK)
     changed = held = -10 * RATE  # samples of the last change and of the last new hold
     watched = _watched(flight)
@@ -186,16 +183,14 @@ def stands(flight: Flight) -> list[str]:
         must = {STATISTICS[index].name for index in np.flatnonzero(present[row]) if index not in APART}
         may = set(must)
         own = flight.event.sensor == 3 and flight.begin <= sample < flight.end + SPIKE
-        states = [("unsettled", SETTLING), ("base", BASE)]
-        for name, fault in states[: 1 if own else 2]:
+        states = [("unsettled", SETTLING), ("rest", EXCITATION), ("base", BASE)]
+        for name, fault in states[: 2 if own else 3]:
             must |= {name} if always[row] & fault else set()
             may |= {name} if ever[row] & fault else set()
         no_arm = BOUND | MISMATCH
         must |= {"unexplained"} if always[row] & no_arm == no_arm else set()
         may |= {"unexplained"} if ever[row] & no_arm == no_arm else set()
         at = int(flight.read[row])
-        must |= {"rest"} if rested[max(0, at - RESTED + 2 * BLOCK) : at + 1].any() else set()
-        may |= {"rest"} if rests[max(0, at - RESTED - BLOCK - READ) : at + 1].any() else set()
         may |= {"missing"} if np.any((outputs[max(0, at - BLOCK - READ) : at + 1]) == THETA | THETA_DOT) else set()
         may |= {"base"} if own else set()
         blind = _blind(flight, sample)
@@ -224,6 +219,20 @@ def stands(flight: Flight) -> list[str]:
         if learns[verdict] and modes[row] == RUN:
             learnt, known = learnt + READ, known + READ
     return said
+
+
+def rests(flight: Flight) -> list[str]:
+    """Require that a rest, once shown, lasts 0.3 s: it ends that long after there was too little motion last
+    (app/README)."""
+    if flight.event.clock_stands:  # samples that are ignored show nothing else
+        return []
+    shown = np.concatenate(([False], (flight.faults & EXCITATION) != 0, [False]))
+    edges = np.flatnonzero(shown[1:] != shown[:-1]).reshape(-1, 2)
+    return [
+        sentence(flight, int(begin), "app/README", f"a rest of {end - begin} samples")
+        for begin, end in edges
+        if end < len(flight.faults) and end - begin < RESTED - 2 * BLOCK
+    ]
 
 
 def _blind(flight: Flight, sample: int) -> int:

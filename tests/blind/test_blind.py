@@ -80,6 +80,12 @@ def test_stands(event: str, mode: Mode) -> None:
     check(oracle.stands, event, mode)
 
 
+@pytest.mark.requirement("R56")
+@pytest.mark.parametrize("mode", MODES, ids="-".join)
+def test_rests(mode: Mode) -> None:
+    check_all(oracle.rests, mode)
+
+
 @pytest.mark.requirement("R5", "R33", "R55", "R56")
 @pytest.mark.parametrize("mode", MODES, ids="-".join)
 def test_holds(mode: Mode) -> None:
@@ -222,12 +228,25 @@ def rising(flown: Flight) -> NDArray[np.float32]:
     return ratios
 
 
+def rested_for(samples: int) -> Callable[[Flight], NDArray[Any]]:
+    """Return faults with a rest of so many samples more, late in a flight."""
+
+    def column(flown: Flight) -> NDArray[Any]:
+        faults = flown.faults.copy()
+        late = 3 * len(faults) // 4
+        faults[late : late + samples] |= tables.EXCITATION
+        return faults
+
+    return column
+
+
 RUN, FROZEN = Mode("run", "dither"), Mode("frozen", "dither")
 DOCTORED: list[tuple[Rule, str, Mode, dict[str, Callable[[Flight], object]]]] = [
     (oracle.shows, "theta_stuck", RUN, {"faults": lambda flown: np.zeros_like(flown.faults)}),
     (oracle.shows, "nothing", FROZEN, {"faults": lambda flown: flown.faults | tables.HANDS_OFF}),
     (oracle.stands, "hands_off", FROZEN, {"verdict": lambda flown: np.full_like(flown.verdict, 10)}),
     (oracle.stands, "nothing", RUN, {"verdict": lambda flown: np.full_like(flown.verdict, 7)}),
+    (oracle.rests, "nothing", RUN, {"faults": rested_for(200)}),
     (oracle.holds, "nothing", FROZEN, {"estimate": estimate_with("parameter", lambda old: 1.01 * old)}),
     (oracle.holds, "theta_stuck", RUN, {"verdict": lambda flown: np.full_like(flown.verdict, 6)}),
     (oracle.certain, "nothing", FROZEN, {"estimate": estimate_with("parameter_sigma", lambda old: 0.9 * old)}),

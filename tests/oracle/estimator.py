@@ -110,6 +110,7 @@ class Estimator:
         self.last_motion = [0.0, 0.0]  # deviations when θ, θ̇ were measured last, of θ as a rate [rad/s]
         self.nis = 0.0
         self.average_nis, self.surprise = 1.0, 1.0  # per output, over a long time and a short one
+        self.squares: list[tuple[float, float]] = []  # of innovations and motion, by each sample of this block
         self.refused = [seconds(0.0), seconds(0.0)]  # time for which θ, θ̇ have been spikes
         self.missing = [seconds(0.0), seconds(0.0)]  # time since the last sample of θ, of θ̇
         self.last_output = [0.0, 0.0]
@@ -164,26 +165,19 @@ class Estimator:
         if back and not inputs_back:
             self._wait_for_levels()
         self._correct(y, valid, duration)
-        self._average_motion(y, valid, duration)
 
     def _correct(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
         """Measurement update, and learning when it is due."""
-        excited = self._is_excited()
         measured = self._is_settled() and bool(valid.any()) and self._knows_inputs()
         self.nis = 0.0
         if valid.any():
             noise = np.diag(self.learning.noise.output_noise)
             innovation = self.belief.update(y, valid, noise, learn=measured)
             self.nis = innovation.normalised_square
-            self._average_innovation(self.nis / int(valid.sum()), duration)
-            self.learning.add(innovation, valid, measured and excited)
-        lesson = Lesson(measured, excited, self.surprise)
-        rate = float(self.belief.x[1])
-        if self.grip is None:
-            self.learning.step(duration, lesson)
-        else:
-            grip = self.grip
-            self.learning.step(duration, lesson, lambda period: grip.end_block(rate, period, measured and excited))
+            square = min(self.nis / int(valid.sum()), SURPRISE_MOST)
+            self.squares.append((square, self._motion(y, valid, duration)))
+            self.learning.add(innovation, valid, measured and not self.learning.rests)
+        self.learning.step(duration, lambda period: self._end_block(measured, period))
         self.considered_sigma[STEP] = self.learning.step_sigma
         if self.learning.explains:
             self.learning.explains, self.surprise = False, 1.0
@@ -251,7 +245,7 @@ class Estimator:
         x, p = self.belief.x + angle, self.scale.physical(self.belief.w)
         pushed, unpushed = (self.model.step(x, p, (u[0], torque, 0.0), self.trim, dt)[1] for torque in (1.0, 0.0))
         kick = -1.0 / (float(pushed - unpushed) * grip.lever.length)
-        learn = self._is_settled() and self._is_excited() and self._knows_inputs()
+        learn = self._is_settled() and not self.learning.rests and self._knows_inputs()
         return Force(seen[0], grip.noise(dt), lambda a, b: grip.expected(a, b, dt), kick, seen[1], learn)
 
     def _deviation(self, detrend: Detrend, value: float, dt: float) -> float:
@@ -336,30 +330,34 @@ class Estimator:
         rate = self.learning.noise.process_noise + self.learning.disturbance
         return math.sqrt(dt) * np.array([[own, rate * dt / 2.0, rate * dt / math.sqrt(12.0)], [0.0, rate, 0.0]])
 
-    def _average_innovation(self, square: float, duration: float) -> None:
-        share, bounded = min(duration / self.settings["excitation_time"], 1.0), min(square, SURPRISE_MOST)
-        if self._is_settled():
-            self.average_nis += share * (bounded - self.average_nis)
-        self.surprise += min(duration / SURPRISE_TIME, 1.0) * (bounded - self.surprise)
+    def _end_block(self, measured: bool, period: float) -> Lesson:
+        """Take the means of the block into the averages, over a long time and a short one."""
+        if self.squares:
+            square, motion = np.mean(self.squares, axis=0)
+            share = min(period / self.settings["excitation_time"], 1.0)
+            if self._is_settled():
+                self.average_nis += share * (square - self.average_nis)
+            self.surprise += min(period / SURPRISE_TIME, 1.0) * (square - self.surprise)
+            self.excitation_square = max(self.excitation_square + share * (motion - self.excitation_square), 0.0)
+            self.motion_square += min(period / MOTION_TIME, 1.0) * (motion - self.motion_square)
+            self.squares = []
+        excited = self._is_excited()
+        if self.grip is not None:
+            self.grip.end_block(float(self.belief.x[1]), period, measured and excited)
+        return Lesson(measured, excited, self.surprise)
 
-    def _average_motion(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
-        """Average the measured square of the rate, over a long time and a short one.
+    def _motion(self, y: Array, valid: NDArray[np.bool_], duration: float) -> float:
+        """Return the measured square of the rate [(rad/s)²].
 
         White noise of the sensor drops out of the product of successive samples. Without θ̇ a rate is presumed from θ.
         """
-        if not valid.any():
-            return
         i = 1 if valid[1] else 0
         now = float(y[i])
         if i == 0:
             angle = now - (0.0 if self.detrended else self.trim)
             now = RATE_OF_ANGLE * 2.0 * math.pi * self.settings["trim_corner"] * angle
         square, self.last_motion[i] = now * self.last_motion[i], now
-        if duration >= OUTAGE:
-            return
-        share = min(duration / self.settings["excitation_time"], 1.0)
-        self.excitation_square = max(self.excitation_square + share * (square - self.excitation_square), 0.0)
-        self.motion_square += min(duration / MOTION_TIME, 1.0) * (square - self.motion_square)
+        return square if duration < OUTAGE else 0.0
 
     # --- estimates -------------------------------------------------------------------------------------------------
 

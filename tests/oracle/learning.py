@@ -46,7 +46,7 @@ def counted(duration: float) -> np.float32:
 
 @dataclass(frozen=True)
 class Lesson:
-    """What may be learnt from a sample."""
+    """What may be learnt from a block."""
 
     measured: bool  # an output and the base are valid, and levels have settled
     excited: bool  # there was motion enough
@@ -97,6 +97,11 @@ class Learning:
         self.kept_ago = seconds(0.0)
         self.kept = (self._snapshot(), self._snapshot())  # one and two KEEP_PERIODs ago
 
+    @property
+    def rests(self) -> bool:
+        """Whether there was too little motion in the last block, or a little before it."""
+        return bool(self.awake < AWAKE - 0.001)
+
     # --- one sample ------------------------------------------------------------------------------------------------
 
     def add(self, innovation: Innovation, valid: NDArray[np.bool_], counts: bool) -> None:
@@ -104,16 +109,15 @@ class Learning:
         if self.adapted and counts:
             self.noise.add(innovation, valid)
 
-    def step(self, duration: float, lesson: Lesson, before: Callable[[float], None] = lambda period: None) -> None:
+    def step(self, duration: float, lesson: Callable[[float], Lesson]) -> None:
         """Let the parameters learn once every learn_period; a sample that is half a sample_period early is on time.
 
-        `before` is called before they do, with the time since they did [s].
+        `lesson` is called before they do, with the time since they did [s].
         """
         self.elapsed += duration
         self.counted += counted(duration)
         if self.counted > seconds(self.settings["learn_period"]) - seconds(0.5 * self.settings["sample_period"]):
-            before(self.elapsed)
-            self._end_block(self.elapsed, self.counted, lesson)
+            self._end_block(self.elapsed, self.counted, lesson(self.elapsed))
             self.elapsed, self.counted = 0.0, seconds(0.0)
 
     # --- a block -----------------------------------------------------------------------------------------------------
@@ -157,7 +161,7 @@ class Learning:
             return "noise"
         if not lesson.measured:
             return "blind"
-        if self.awake < AWAKE - 0.001:
+        if self.rests:
             return "rest"
         if self.since_change < seconds(GRIP):
             return "regrip"

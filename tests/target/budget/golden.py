@@ -14,13 +14,13 @@ TOLERANCE = 0.02
 ACCEPT = "cmake --build build --target budget-accept"
 
 LIMITS = {
-    "instructions.dual.lever.mean": 2850,
-    "instructions.dual.lever.worst": 8900,
+    "instructions.dual.lever.mean": 2775,
+    "instructions.dual.lever.worst": 8850,
     "instructions.dual.lever.start_up_worst": 8100,
-    "instructions.tick.dual.lever.mean": 4250,
-    "instructions.bounce.dual.lever.mean": 3930,
+    "instructions.tick.dual.lever.mean": 4175,
+    "instructions.bounce.dual.lever.mean": 3860,
     "instructions_after_gap.dual": 20000,
-    "cycles.dual.lever.mean": 4440,
+    "cycles.dual.lever.mean": 4325,
     "init.instructions": 100_000,
     "text_bytes": 42 << 10,
     "memory_bytes": 2464,

@@ -17,6 +17,7 @@ static setup_t setup;
 static lever_config_t config;
 static cdkf_t cdkf;
 static random_source_t source;
+static float surprise; /* nis / nis_size of the samples of the next blocks; 0: none has an output */
 
 void setUp(void)
 {
@@ -30,23 +31,26 @@ void setUp(void)
     cdkf.scaling.positive = true;
     evidence_start(&evidence);
     source.state = 21u;
+    surprise = 0.0f;
 }
 
 /* --- stuck signals ------------------------------------------------------------------------------------------------ */
-
-static void surprise(double ratio, uint32_t samples)
-{
-    for (uint32_t k = 0u; k < samples; k++) {
-        evidence_add_nis(&evidence, (float)ratio, PERIOD, 1.0f);
-    }
-}
 
 /* The end of a block of an arm that is known. */
 static void end_block(void)
 {
     const evidence_block_t block = {
         .setup = &setup, .period = (float)SAMPLES * PERIOD, .known = true, .verdict = (uint8_t)VERDICT_REST};
+    for (uint32_t k = 0u; (k < (uint32_t)SAMPLES) && (surprise > 0.0f); k++) {
+        evidence_add_nis(&evidence, surprise);
+    }
     evidence_end_block(&evidence, &cdkf, &block);
+}
+
+/* But for EXCITATION: motion is not fed here. */
+static uint32_t faults_shown(void)
+{
+    return evidence.faults & ~(uint32_t)LEVER_FAULT_EXCITATION;
 }
 
 static bool is_stuck(void)
@@ -86,13 +90,13 @@ TEST(a_signal_that_stands_still_against_the_innovations_is_stuck)
     for (uint32_t which = 0u; which < (uint32_t)SIGNAL_COUNT; which++) {
         setUp();
         TEST_ASSERT_FALSE(block(which, 0.5f));
-        surprise(4.0, 300u);
+        surprise = 4.0f;
         for (uint32_t k = 0u; k < 4u; k++) {
             TEST_ASSERT_TRUE(!block(which, 0.5f) && is_alive(which, 0.5f));
         }
         TEST_ASSERT_TRUE(block(which, 0.5f));
         TEST_ASSERT_TRUE(!is_alive(which, 0.5f) && is_stuck());
-        surprise(1.0, 1000u); /* without the signal nothing surprises any more */
+        surprise = 1.0f; /* without the signal nothing surprises any more */
         TEST_ASSERT_TRUE(!block(which, 0.5f) && !is_alive(which, 0.5f));
         TEST_ASSERT_FALSE(is_alive(which, 0.6f)); /* until the end of the block */
         TEST_ASSERT_FALSE(block(which, 0.6f));
@@ -103,7 +107,7 @@ TEST(a_signal_that_stands_still_against_the_innovations_is_stuck)
 /* Its sender says so itself: then it is missing, not stuck, however long, and counts anew when it is back. */
 TEST(a_signal_that_is_not_sent_or_not_valid_is_not_stuck)
 {
-    surprise(4.0, 300u);
+    surprise = 4.0f;
     for (uint32_t k = 0u; k < 4u; k++) {
         TEST_ASSERT_FALSE(block((uint32_t)SIGNAL_THETA, 0.5f));
     }
@@ -149,13 +153,33 @@ TEST(an_angle_that_stands_still_without_a_surprise_rests)
 
 TEST(the_fast_mean_of_nis_is_over_a_tenth_of_a_second)
 {
-    surprise(3.0, 100u);
-    TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0 + (2.0 * (1.0 - exp(-1.0))), (double)evidence.nis_fast);
-    evidence_start(&evidence);
-    surprise(1.0e3, 1u);
-    TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, 1.0f + (0.01f * 99.0f), evidence.nis_fast);
-    evidence_add_nis(&evidence, 2.0f, 10.0f, 1.0f);
-    TEST_ASSERT_TRUE(evidence.nis_fast == 2.0f);
+    surprise = 3.0f;
+    for (uint32_t k = 0u; k < 5u; k++) {
+        end_block();
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 1.0 + (2.0 * (1.0 - exp(-1.0))), (double)evidence.nis_fast);
+    TEST_ASSERT_DOUBLE_WITHIN(1.0e-3, 1.0 + (2.0 * (1.0 - pow(0.8, 5.0))), (double)evidence.nis_fast);
+}
+
+/* A single sample counts as at most 100, and a block without an output not at all. */
+TEST(the_means_of_nis_take_the_mean_of_a_block)
+{
+    evidence_block_t block = {.setup = &setup, .period = 0.02f};
+    evidence_add_nis(&evidence, 1.0e3f);
+    for (uint32_t k = 0u; k < 3u; k++) {
+        evidence_add_nis(&evidence, 2.0f);
+    }
+    evidence_end_block(&evidence, &cdkf, &block);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, 1.0f + (0.2f * 25.5f), evidence.nis_fast);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, 1.0f + ((0.02f / config.settings.excitation_time) * 25.5f), evidence.nis_slow);
+    const evidence_t before = evidence;
+    evidence_end_block(&evidence, &cdkf, &block);
+    TEST_ASSERT_TRUE((evidence.nis_fast == before.nis_fast) && (evidence.nis_slow == before.nis_slow));
+    evidence_note(&evidence, EVIDENCE_UNSETTLED, true);
+    evidence_add_nis(&evidence, 2.0f);
+    block.period = 10.0f;
+    evidence_end_block(&evidence, &cdkf, &block);
+    TEST_ASSERT_TRUE((evidence.nis_fast == 2.0f) && (evidence.nis_slow == before.nis_slow));
 }
 
 /* --- spikes ------------------------------------------------------------------------------------------------------- */
@@ -176,11 +200,22 @@ static bool is_spike(uint32_t i, float sigmas, float level)
 TEST(a_rate_before_an_outage_says_nothing_of_motion_after_it)
 {
     evidence_start(&evidence);
-    evidence_add_motion(&evidence, 1u, 1.0f, 0.001f, &config.settings);
-    evidence_add_motion(&evidence, 1u, 1.0f, TRIM_OUTAGE, &config.settings);
+    evidence_add_motion(&evidence, 1u, 2.0f, PERIOD, PERIOD);
+    evidence_add_motion(&evidence, 1u, 2.0f, TRIM_OUTAGE, PERIOD);
+    surprise = 1.0f;
+    end_block();
     TEST_ASSERT_TRUE((evidence.motion.fast == 0.0f) && (evidence.motion.slow == 0.0f));
-    evidence_add_motion(&evidence, 1u, 1.0f, 0.001f, &config.settings);
-    TEST_ASSERT_TRUE((evidence.motion.fast > 0.0f) && (evidence.motion.slow > 0.0f));
+    for (uint32_t k = 0u; k < (uint32_t)SAMPLES; k++) {
+        evidence_add_motion(&evidence, 1u, ((k % 2u) == 0u) ? 3.0f : 2.0f, PERIOD, PERIOD);
+    }
+    end_block();
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, 0.2f * 6.0f, evidence.motion.fast);
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, (0.02f / config.settings.excitation_time) * 6.0f, evidence.motion.slow);
+    for (uint32_t k = 0u; k < (uint32_t)SAMPLES; k++) { /* noise: of no sign */
+        evidence_add_motion(&evidence, 1u, ((k % 2u) == 0u) ? 30.0f : -30.0f, PERIOD, PERIOD);
+    }
+    end_block();
+    TEST_ASSERT_TRUE((evidence.motion.fast < 0.0f) && (evidence.motion.slow == 0.0f));
 }
 
 /* Samples of the longest sample_period that come a little late. */
@@ -190,9 +225,9 @@ TEST(a_sample_that_follows_the_last_one_says_something_of_motion)
     config.settings.sample_period = 0.02f;
     for (uint32_t k = 0u; k < 3u; k++) {
         evidence_start(&evidence);
-        evidence_add_motion(&evidence, 1u, 1.0f, elapsed[k], &config.settings);
-        evidence_add_motion(&evidence, 1u, 1.0f, elapsed[k], &config.settings);
-        TEST_ASSERT_EQUAL(k < 2u, evidence.motion.slow > 0.0f);
+        evidence_add_motion(&evidence, 1u, 1.0f, elapsed[k], config.settings.sample_period);
+        evidence_add_motion(&evidence, 1u, 1.0f, elapsed[k], config.settings.sample_period);
+        TEST_ASSERT_EQUAL(k < 2u, evidence.motion.sum > 0.0f);
     }
 }
 
@@ -328,7 +363,7 @@ TEST(an_angle_that_is_not_the_integral_of_the_rate_is_found_within_a_second)
         const uint32_t after = apart_after(swing);
         TEST_ASSERT_TRUE((after >= 1u) && (after <= 30u));
         evidence_show(&evidence);
-        TEST_ASSERT_EQUAL_HEX32(LEVER_FAULT_THETA | LEVER_FAULT_THETA_DOT, evidence.faults);
+        TEST_ASSERT_EQUAL_HEX32(LEVER_FAULT_THETA | LEVER_FAULT_THETA_DOT, faults_shown());
         (void)apart_after(agreeing);
         TEST_ASSERT_FALSE(evidence_has(&evidence, EVIDENCE_KINEMATICS));
     }
@@ -507,7 +542,7 @@ TEST(a_gain_of_the_torque_that_is_off_by_a_fifth_shows_within_two_seconds)
         TEST_ASSERT_EQUAL_UINT32(0u, torque_wrong_after(0.3, row[i].gain, row[i].other));
         evidence_show(&evidence);
         TEST_ASSERT_EQUAL(row[i].shown, evidence_has(&evidence, EVIDENCE_TORQUE_GAIN));
-        TEST_ASSERT_EQUAL_HEX32(row[i].shown ? LEVER_FAULT_CALIBRATION : 0u, evidence.faults);
+        TEST_ASSERT_EQUAL_HEX32(row[i].shown ? LEVER_FAULT_CALIBRATION : 0u, faults_shown());
     }
 }
 
@@ -546,7 +581,7 @@ TEST(a_clock_at_another_rate_shows_within_half_a_second)
         for (uint32_t i = 0u; i < (sizeof wrong / sizeof wrong[0]); i++) {
             TEST_ASSERT_TRUE(clock_until(true, periods[k], wrong[i]) < 0.5f);
             evidence_show(&evidence);
-            TEST_ASSERT_EQUAL_HEX32(LEVER_FAULT_CALIBRATION, evidence.faults);
+            TEST_ASSERT_EQUAL_HEX32(LEVER_FAULT_CALIBRATION, faults_shown());
             TEST_ASSERT_TRUE(clock_until(false, periods[k], 1.0f) < 1.0f);
         }
     }
@@ -757,16 +792,40 @@ TEST(the_verdict_on_the_torque_waits_until_enough_is_asked)
     }
 }
 
-/* The lack of motion is noted with each sample; the rest ends 0.3 s later. */
 /* R56 */
-TEST(a_rest_lasts_so_much_longer_than_the_lack_of_motion)
+TEST(a_rest_is_shown_from_the_start_and_lasts_so_much_longer_than_the_lack_of_motion)
 {
-    evidence_note(&evidence, EVIDENCE_REST, true);
+    TEST_ASSERT_EQUAL_UINT32(LEVER_FAULT_EXCITATION, evidence.faults);
     end_block();
     for (uint32_t k = 1u; k <= 20u; k++) {
-        evidence_note(&evidence, EVIDENCE_REST, false);
+        evidence.motion.slow = 1.0f;
+        evidence.motion.fast = 1.0f;
         end_block();
+        evidence_show(&evidence);
         TEST_ASSERT_EQUAL(k < 15u, evidence_has(&evidence, EVIDENCE_REST));
+        TEST_ASSERT_EQUAL_UINT32((k < 15u) ? (uint32_t)LEVER_FAULT_EXCITATION : 0u, evidence.faults);
+    }
+}
+
+/* Both means, against the least that is set and a fifth of the noise's variance. */
+TEST(there_is_rest_where_either_mean_of_motion_is_too_small)
+{
+    static const struct {
+        float slow;
+        float fast;
+        bool rests;
+    } row[] = {{1.01f, 0.26f, false}, {0.99f, 0.26f, true}, {1.01f, 0.24f, true}, {0.99f, 2.0f, true}};
+    for (uint32_t i = 0u; i < 4u; i++) {
+        setUp();
+        config.settings.excitation_least = 0.02f;
+        cdkf.output_noise[1] = 0.06f;
+        const float least = (0.02f * 0.02f) + (0.2f * 0.06f * 0.06f);
+        for (uint32_t k = 0u; k < 15u; k++) {
+            evidence.motion.slow = row[i].slow * least;
+            evidence.motion.fast = row[i].fast * least;
+            end_block();
+        }
+        TEST_ASSERT_EQUAL(row[i].rests, evidence_has(&evidence, EVIDENCE_REST));
     }
 }
 

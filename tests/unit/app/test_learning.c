@@ -96,7 +96,7 @@ TEST_EACH(COMBINATIONS, without_excitation_nothing_is_learnt_and_nothing_winds_u
     }
     TEST_ASSERT_TRUE(cdkf->growth == 0.0f);
     simulation.base_rms = 0.98;
-    (void)run(500u);
+    (void)run(800u);
     TEST_ASSERT_FALSE(has_fault(LEVER_FAULT_EXCITATION));
 }
 
@@ -334,6 +334,21 @@ TEST(what_was_under_way_ends_when_it_is_frozen)
     request(LEVER_REQUEST_FREEZE);
     (void)run(20u);
     TEST_ASSERT_TRUE(learning->evidence.since_change > 100.0f);
+    TEST_ASSERT_EQUAL_UINT32(CDKF_CALIBRATION, lever->estimator.cdkf.acting);
+}
+
+/* What is taken back is the change, too: its step would otherwise count for 3 s, and then no more, and nothing learnt. */
+/* R55 */
+TEST(the_step_of_a_change_ends_when_the_parameters_are_taken_back)
+{
+    learning_t *learning = start_learning(400u);
+    lever->estimator.cdkf.acting = (uint32_t)CDKF_CONSIDERED;
+    learning->evidence.since_change = 1.0f;
+    (void)run(2u);
+    TEST_ASSERT_EQUAL_UINT32(CDKF_CONSIDERED, lever->estimator.cdkf.acting);
+    learning->evidence.torque = (agreement_t){1.0f, 1.0f, -1.0f}; /* a motor that does the reverse */
+    (void)run(1u);
+    TEST_ASSERT_EQUAL(VERDICT_MOTOR_WRONG, learning->verdict);
     TEST_ASSERT_EQUAL_UINT32(CDKF_CALIBRATION, lever->estimator.cdkf.acting);
 }
 
