@@ -238,6 +238,7 @@ static void judge_base(evidence_t *evidence, const score_t *sudden, float period
     const bool before = evidence_has(evidence, EVIDENCE_BASE);
     const float keep = 1.0f - share_of(period, before ? BASE_MEMORY_WRONG : BASE_MEMORY);
     const float sure = before ? BASE_SURE_WRONG : BASE_SURE;
+    const float noise = before ? 1.0f : greater(evidence->nis_fast, 1.0f); /* rough air that begins is no wrong base */
     base->vector = (keep * base->vector) + sudden->vector;
     base->information = (keep * base->information) + sudden->information;
     evidence->ratio[EVIDENCE_BASE] = 0.0f;
@@ -246,7 +247,7 @@ static void judge_base(evidence_t *evidence, const score_t *sudden, float period
         const float away = fabsf(gain - 1.0f);
         evidence->base_unheard = 0.0f;
         evidence->ratio[EVIDENCE_BASE] = lesser(away * rows[EVIDENCE_BASE].inverse, 1.0f); /* not sure yet */
-        if ((base->information * (sure * sure)) > 1.0f) {
+        if ((base->information * (sure * sure)) > noise) {
             evidence_set(evidence, EVIDENCE_BASE, away);
         }
     } else {

@@ -731,23 +731,27 @@ TEST(a_ratio_of_the_base_above_one_is_evidence)
 }
 
 /* Sums forget with 0.5 s, and while the base is wrong with 0.2 s; from a standard deviation of 0.1 on, and 0.2, they
- * count: of a gain of 0 and of 1. Nothing is held against it before the arm is known, but while the parameters are
+ * count: of a gain of 0 and of 1. Before the base is wrong that deviation is larger where innovations are. Nothing is held against it before the arm is known, but while the parameters are
  * held. */
 TEST(the_verdict_on_the_base_waits_until_it_is_sure)
 {
     static const struct {
         float information;
         float period;
+        float nis;
         bool before;
         bool is;
         float kept;
-    } row[] = {{50.0f, 0.02f, false, false, 48.0f}, {5.0f, 0.02f, true, true, 4.5f},
-        {99.0f, 1e-9f, false, false, 99.0f}, {101.0f, 1e-9f, false, true, 0.0f}, {24.0f, 1e-9f, true, true, 24.0f},
-        {26.0f, 1e-9f, true, false, 0.0f}};
+    } row[] = {{50.0f, 0.02f, 1.0f, false, false, 48.0f}, {5.0f, 0.02f, 1.0f, true, true, 4.5f},
+        {99.0f, 1e-9f, 1.0f, false, false, 99.0f}, {101.0f, 1e-9f, 1.0f, false, true, 0.0f},
+        {99.0f, 1e-9f, 0.5f, false, false, 99.0f}, {395.0f, 1e-9f, 4.0f, false, false, 395.0f},
+        {405.0f, 1e-9f, 4.0f, false, true, 0.0f}, {24.0f, 1e-9f, 1.0f, true, true, 24.0f},
+        {26.0f, 1e-9f, 1.0f, true, false, 0.0f}, {26.0f, 1e-9f, 4.0f, true, false, 0.0f}};
     for (uint32_t i = 0u; i < (sizeof row / sizeof row[0]); i++) {
         const evidence_block_t block = {.setup = &setup, .period = row[i].period, .held = true};
         setUp();
         evidence_note(&evidence, EVIDENCE_BASE, row[i].before);
+        evidence.nis_fast = row[i].nis;
         evidence.base.information = row[i].information;
         evidence.base.vector = row[i].before ? -row[i].information : row[i].information;
         evidence_end_block(&evidence, &cdkf, &block);
