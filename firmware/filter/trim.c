@@ -124,10 +124,16 @@ static float pass_line(trim_t *trim, uint32_t i, float value, float period)
     return deviation;
 }
 
+/* An output is missing for so long that a straight line says little of its motion. */
+static bool is_forgotten(const trim_t *trim, uint32_t i)
+{
+    return (trim->corner * trim->missing[i]) > 1.0f;
+}
+
 /* The level of a missing output stays, as its sections would integrate their own sum. */
 static void wait_for_output(trim_t *trim, uint32_t i, float period)
 {
-    if (trim_is_waiting(trim, i)) {
+    if (is_forgotten(trim, i)) {
         for (uint32_t k = 0u; k < SECTIONS; k++) {
             trim->output[i].section[k].slope = 0.0f;
         }
@@ -142,9 +148,9 @@ static float irregular(trim_t *trim, uint32_t i, float value, bool valid, float 
     if (!valid) {
         wait_for_output(trim, i, period);
     } else {
-        const bool waiting = trim_is_waiting(trim, i);
-        deviation = waiting ? pass(&trim->output[i], value, trim->corner * period) : pass_line(trim, i, value, period);
-        *back = *back || waiting;
+        *back = *back || trim_is_waiting(trim, i);
+        deviation = is_forgotten(trim, i) ? pass(&trim->output[i], value, trim->corner * period)
+                                          : pass_line(trim, i, value, period);
         trim->missing[i] = 0.0f;
     }
     return deviation;

@@ -92,8 +92,8 @@ void trim_set_origin(trim_t *trim);
 
 /* Replaces valid outputs y by deviations from the levels, in preload trim, `period` seconds after the last sample.
  * While an output is not valid its level waits, and when it is back takes the straight line between both samples: to
- * follow its own prediction would be to integrate six times (seen: one sample in three, and the state exploded). Returns
- * true when an output is back after an outage. */
+ * follow its own prediction would be to integrate six times (seen: one sample in three, and the state exploded). After
+ * longer than 1 / corner it begins anew. Returns true when an output is back after an outage. */
 bool trim_outputs(trim_t *trim, float y[MODEL_STATES], const bool valid[MODEL_STATES], float period);
 
 /* The level of output i waits for samples. */
