@@ -186,6 +186,10 @@ static void end_block(learning_t *learning, const setup_t *setup, cdkf_t *cdkf, 
         evidence_note_bound(evidence, scaling_bound(&cdkf->scaling, cdkf->w));
         keep(learning, cdkf, block.period, true);
     } else {
+        if ((learning->verdict == (uint8_t)VERDICT_SETTLING) && (cdkf->trust > 0.0f) && !is_known(learning)) {
+            cdkf_open(cdkf); /* what little there was before an outage moves the estimate, and is not certain */
+            keep_only(learning, cdkf);
+        }
         estimate_noise(learning, setup, cdkf, block.period);
         if (verdict_rows[learning->verdict].adapt ||
             (evidence->opened && verdict_rows[learning->verdict].learn)) { /* nothing else is left to return to */

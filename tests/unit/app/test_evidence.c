@@ -731,8 +731,8 @@ TEST(a_ratio_of_the_base_above_one_is_evidence)
 }
 
 /* Sums forget with 0.5 s, and while the base is wrong with 0.2 s; from a standard deviation of 0.1 on, and 0.2, they
- * count: of a gain of 0 and of 1. Before the base is wrong that deviation is larger where innovations are. Nothing is held against it before the arm is known, but while the parameters are
- * held. */
+ * count: of a gain of 0 and of 1. Until the base is wrong that deviation is larger where innovations are. Nothing is
+ * held against it before the arm is known, but while the parameters are held. */
 TEST(the_verdict_on_the_base_waits_until_it_is_sure)
 {
     static const struct {
