@@ -412,7 +412,7 @@ class Augmented(Belief):
 
     @property
     def pending(self) -> bool:
-        return False
+        return bool(self.correction.any())
 
     def drop_pending(self) -> None:
         """Nothing is."""

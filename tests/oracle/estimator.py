@@ -168,15 +168,15 @@ class Estimator:
 
     def _correct(self, y: Array, valid: NDArray[np.bool_], duration: float) -> None:
         """Measurement update, and learning when it is due."""
-        measured = self._is_settled() and bool(valid.any()) and self._knows_inputs()
+        measured, settled = bool(valid.any()) and self._knows_inputs(), self._is_settled()
         self.nis = 0.0
         if valid.any():
             noise = np.diag(self.learning.noise.output_noise)
-            innovation = self.belief.update(y, valid, noise, learn=measured)
+            innovation = self.belief.update(y, valid, noise, learn=measured and settled)
             self.nis = innovation.normalised_square
             square = min(self.nis / int(valid.sum()), SURPRISE_MOST)
             self.squares.append((square, self._motion(y, valid, duration)))
-            self.learning.add(innovation, valid, measured and not self.learning.rests)
+            self.learning.add(innovation, valid, measured and settled and not self.learning.rests)
         self.learning.step(duration, lambda period: self._end_block(measured, period))
         self.considered_sigma[STEP] = self.learning.step_sigma
         if self.learning.explains:
@@ -256,20 +256,21 @@ class Estimator:
         """Return the outputs without their slow level, as x is in preload trim, and whether one is back after an
         outage.
 
-        A level waits for samples, and after a few missing ones takes a straight line when the output is back.
+        A level waits for samples, and takes a straight line when the output is back, within 1 / corner.
         """
         deviation, back = np.zeros(2), False
         for i, detrend in enumerate(self.outputs):
             waiting = bool(self.missing[i] > OUTAGE)
+            forgotten = 2.0 * math.pi * self.settings["trim_corner"] * float(self.missing[i]) > 1.0
             if valid[i]:
-                steps = 1 if waiting else min(round(float(self.missing[i]) / dt) + 1, MOST_STEPS)
-                elapsed = dt if waiting else float(self.missing[i]) + dt
+                steps = 1 if forgotten else min(round(float(self.missing[i]) / dt) + 1, MOST_STEPS)
+                elapsed = dt if forgotten else float(self.missing[i]) + dt
                 for value in np.linspace(self.last_output[i], float(y[i]), steps + 1)[1:].tolist():
                     deviation[i] = self._deviation(detrend, value, elapsed / steps)
                 back = back or waiting
                 self.last_output[i], self.missing[i] = float(y[i]), seconds(0.0)
                 continue
-            if waiting:
+            if forgotten:
                 detrend.hold()
             self.missing[i] += seconds(dt)
         self.rest += min(dt / REST_TIME, 1.0) * (self.trim - self.rest)
@@ -343,8 +344,8 @@ class Estimator:
             self.squares = []
         excited = self._is_excited()
         if self.grip is not None:
-            self.grip.end_block(float(self.belief.x[1]), period, measured and excited)
-        return Lesson(measured, excited, self.surprise)
+            self.grip.end_block(float(self.belief.x[1]), period, measured and self._is_settled() and excited)
+        return Lesson(measured, self._is_settled(), excited, self.surprise)
 
     def _motion(self, y: Array, valid: NDArray[np.bool_], duration: float) -> float:
         """Return the measured square of the rate [(rad/s)²].

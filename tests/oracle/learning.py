@@ -48,7 +48,8 @@ def counted(duration: float) -> np.float32:
 class Lesson:
     """What may be learnt from a block."""
 
-    measured: bool  # an output and the base are valid, and levels have settled
+    measured: bool  # an output and the inputs are valid
+    settled: bool  # and levels have settled
     excited: bool  # there was motion enough
     surprise: float  # average of the latest normalised innovations; expected 1
 
@@ -94,7 +95,7 @@ class Learning:
         self.explains = False  # innovations tell from now on whether a change explains them
         self.moved = False  # a new grip is complete, and has moved the lever
         self.step_sigma = 0.0  # of the step; 0: there is none
-        self.kept_ago = seconds(0.0)
+        self.kept_ago = seconds(settings["align_time"])
         self.kept = (self._snapshot(), self._snapshot())  # one and two KEEP_PERIODs ago
 
     @property
@@ -134,8 +135,10 @@ class Learning:
         learns = self.verdict in ("new", "learning")
         if not learns:
             self.belief.drop_pending()
+        self._open()
         if self.adapted:
             self._estimate_noise(counted)
+        self._keep(counted)
         score = self.belief.step_score if isinstance(self.belief, TwoStage) else StepScore()
         correction, covariance = self._learn(counted)
         if learns and self.step_sigma > 0.0:
@@ -161,6 +164,8 @@ class Learning:
             return "noise"
         if not lesson.measured:
             return "blind"
+        if not lesson.settled:
+            return "settling"
         if self.rests:
             return "rest"
         if self.since_change < seconds(GRIP):
@@ -245,11 +250,15 @@ class Learning:
             self.noise.begin()
         elif self.noise.end_block(period, NOISE_WINDOW if grown else 1.0) and not grown and self.kept[1].trust < 1.0:
             self._restore()
-        if self.verdict == "learning":
-            self.kept_ago += period
-            if self.kept_ago >= KEEP_PERIOD and self.noise.elapsed > 0.0:
-                self.kept_ago = seconds(0.0)
-                self.kept = (self._snapshot(), self.kept[0])
+
+    def _keep(self, period: np.float32) -> None:
+        """Keep the belief each KEEP_PERIOD of learning, but not in a block that ends a window of noise."""
+        if self.verdict != "learning":
+            return
+        self.kept_ago += period
+        if self.kept_ago >= KEEP_PERIOD and (self.noise.elapsed > 0.0 or not self.adapted):
+            self.kept_ago = seconds(0.0)
+            self.kept = (self._snapshot(), self.kept[0])
 
     def _restore(self) -> None:
         kept = self.kept[1]
@@ -257,6 +266,14 @@ class Learning:
         self.trust = kept.trust
         self.noise.begin()
         self.kept, self.kept_ago = (kept, kept), seconds(0.0)
+
+    def _open(self) -> None:
+        """While levels settle, what an arm that is not known has taught is not certain: the estimate stays."""
+        if self.verdict != "settling" or self.trust <= 0.0 or self.kept[1].trust >= 1.0:
+            return
+        self.belief.restore(self.belief.w, np.diag(self.greatest_sigma), errors=False)
+        self.trust = seconds(0.0)
+        self.kept, self.kept_ago = (self._snapshot(), self._snapshot()), seconds(0.0)
 
     def _snapshot(self) -> Snapshot:
         return Snapshot(self.belief.w.copy(), self.belief.w_factor.copy(), self.trust)

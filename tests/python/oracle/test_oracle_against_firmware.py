@@ -40,7 +40,7 @@ EVERY = 7  # samples from one comparison to the next: all phases of a block of s
 
 # Greatest difference: of an estimate in standard deviations, of a standard deviation relatively, of the normalised
 # innovation squared in 1 + itself. Two to three times what was measured (an estimate of theta is rounded at 3e-8 rad).
-PARAMETERS_WITHIN, THETA_WITHIN, THETA_DOT_WITHIN, SIGMA_WITHIN, NIS_WITHIN = 1e-3, 2e-2, 1e-3, 2.5e-3, 2e-3
+PARAMETERS_WITHIN, THETA_WITHIN, THETA_DOT_WITHIN, SIGMA_WITHIN, NIS_WITHIN = 1e-3, 2e-2, 3e-3, 2.5e-3, 2e-3
 
 
 def single(values: Array) -> Array:
