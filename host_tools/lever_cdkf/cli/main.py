@@ -62,8 +62,8 @@ a first session:
 
 `lever` alone prints this; `lever COMMAND --help` explains a command. Exit status: 0 when all went well; 1 when the
 command ran, but what it checks does not hold (limits of a scenario, no estimate from a log, …); 2 with one line on
-standard error when the command line or an input is wrong; 130, with one line too, after Ctrl-C. A log that is cut off
-is used as far as it goes, with a warning on standard error.
+standard error when the command line or an input is wrong; 130, with one line too, after Ctrl-C or SIGTERM.
+A log that is cut off is used as far as it goes, with a warning on standard error.
 
 Tables wrap at the width of the terminal. In a pipe or file each row is one line, unless COLUMNS says how wide.
 """

@@ -12,7 +12,7 @@ from ..can.identifiers import add_identifier_options
 from ..cli.formats import add_format_option, chosen_formats
 from ..cli.layout import say, warn
 from ..cli.tables import Row, Tables, add_json_option
-from ..runtime.files import check_not_input
+from ..runtime.files import check_not_input, made_folder
 from . import options
 
 if TYPE_CHECKING:
@@ -123,12 +123,13 @@ def _run_each(args: argparse.Namespace) -> int:
         read_mapping(args.map)
     options.check_part(args)
     formats = chosen_formats(args)
-    with Progress("replay") as progress:
-        replays = replay_each(args.logs, lambda log: _options(args, log, formats), args.out, progress.show)
-    print_tables({"logs": rows_of(replays)}, args.json, inputs=[*args.logs, *options.input_files(args)])
-    if args.out is not None:
-        written = write(replays, args.out, options.input_files(args))
-        say(f"Written to {args.out}: {', '.join([*written, 'a folder for each log'])}")
+    with made_folder(args.out):
+        with Progress("replay") as progress:
+            replays = replay_each(args.logs, lambda log: _options(args, log, formats), args.out, progress.show)
+        print_tables({"logs": rows_of(replays)}, args.json, inputs=[*args.logs, *options.input_files(args)])
+        if args.out is not None:
+            written = write(replays, args.out, options.input_files(args))
+            say(f"Written to {args.out}: {', '.join([*written, 'a folder for each log'])}")
     for each in replays:
         if each.problem:
             print(f"lever: replay: {each.log}: {each.problem.removeprefix(f'{each.log}: ')}", file=sys.stderr)

@@ -122,13 +122,27 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
                 target.unlink()
 
 
-def make_folder(folder: Path) -> None:
-    """Make a folder and those above it, where they are not there yet. Raise LeverError."""
+@contextmanager
+def made_folder(folder: Path | None) -> Iterator[None]:
+    """Make a folder and those above it, where they are not there yet; None: do nothing. Raise LeverError.
+
+    Those that it has made and that are empty at the end are removed: a command that fails leaves none behind.
+    """
+    if folder is None:
+        yield
+        return
+    missing = [each for each in (folder, *folder.parents) if not each.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         why = "there is a file of that name" if folder.is_file() else error.strerror
         raise LeverError(f"cannot make the folder {folder}: {why}") from None
+    try:
+        yield
+    finally:
+        with suppress(OSError):  # of the first that is not empty
+            for each in missing:
+                each.rmdir()
 
 
 @contextmanager
@@ -188,15 +202,19 @@ class Outputs:
         self._unfinished = folder
         self._inputs = list(inputs)
         self._names: list[str] = []
+        self._made = ExitStack()
 
     def __enter__(self) -> Outputs:
-        make_folder(self._folder)
-        with writing(self._folder):
-            self._unfinished = Path(tempfile.mkdtemp(".tmp", ".lever.", self._folder))
+        with ExitStack() as stack:
+            stack.enter_context(made_folder(self._folder))
+            with writing(self._folder):
+                self._unfinished = Path(tempfile.mkdtemp(".tmp", ".lever.", self._folder))
+            stack.callback(shutil.rmtree, self._unfinished, ignore_errors=True)
+            self._made = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
-        shutil.rmtree(self._unfinished, ignore_errors=True)
+        self._made.close()
 
     def path(self, name: str) -> Path:
         """Where to write the file `name`. Raise LeverError when in its place is an input, or a folder."""

@@ -1,4 +1,4 @@
-"""Ctrl-C ends a command with one line and exit status 130, whenever it comes.
+"""Ctrl-C or SIGTERM ends a command with one line and exit status 130, whenever it comes.
 
 KeyboardInterrupt alone does not do that: it is lost when it is raised while an object is deleted, or in a library that
 catches everything. So it is remembered as well, and looked for now and then, and before files are put into place.
@@ -25,18 +25,24 @@ _Done = TypeVar("_Done")
 
 START = 0.5
 """What worker processes take to start [s]."""
+_USUAL = {signal.SIGINT: (signal.default_int_handler, exit_at_once), signal.SIGTERM: (signal.SIG_DFL,)}
+"""Handlers where nobody else has taken the signal."""
 _came = False
 
 
 @contextmanager
 def heard() -> Iterator[None]:
-    """Inside, Ctrl-C is a KeyboardInterrupt that check() knows of; not where it is ignored or somebody else's."""
-    before, hook = signal.getsignal(signal.SIGINT), sys.unraisablehook
-    is_ours = before in (signal.default_int_handler, exit_at_once)
-    if not is_ours or threading.current_thread() is not threading.main_thread():
+    """Inside, Ctrl-C and SIGTERM are a KeyboardInterrupt that check() knows of.
+
+    Not one that is ignored or somebody else's.
+    """
+    before = {number: handler for number, usual in _USUAL.items() if (handler := signal.getsignal(number)) in usual}
+    if not before or threading.current_thread() is not threading.main_thread():
         yield
         return
-    signal.signal(signal.SIGINT, _hear)
+    hook = sys.unraisablehook
+    for number in before:
+        signal.signal(number, _hear)
     sys.unraisablehook = lambda lost: None if lost.exc_type is KeyboardInterrupt else hook(lost)
     try:
         yield
@@ -45,7 +51,8 @@ def heard() -> Iterator[None]:
         check()  # what fails after a lost one fails because of it
         raise
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
         sys.unraisablehook = hook
         forget()
 
@@ -63,7 +70,7 @@ def check() -> None:
 
 
 def forget() -> None:
-    """Ctrl-C has done what it should."""
+    """Forget the signal, which has done what it should."""
     global _came
     _came = False
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from lever_cdkf.cli.layout import say
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
-from lever_cdkf.runtime.files import check_writable, make_folder
+from lever_cdkf.runtime.files import check_writable, made_folder
 
 from .names import check_names
 from .results import write_results
@@ -83,11 +83,8 @@ class AcceptanceCommand(ABC, Generic[Row]):
         parser.set_defaults(run=self.run)
 
     def run(self, args: argparse.Namespace) -> int:
-        """Return the sub-command."""
-        from lever_cdkf.cli.progress import Progress
+        """Run the sub-command; return the exit status."""
         from lever_cdkf.cli.tables import print_tables
-
-        from ..acceptance import table
 
         if args.list:
             listed = {
@@ -100,10 +97,20 @@ class AcceptanceCommand(ABC, Generic[Row]):
         seeds = args.seeds if args.seeds is not None else self.quick_seeds if args.quick else self.seeds
         if not 1 <= seeds <= 1000:
             raise LeverError(f"--seeds {seeds}: must be from 1 to 1000")
-        if args.out is not None:  # before a campaign that could then not be kept
-            require("report")
-            make_folder(args.out)
-            check_writable(args.out / f"{self.name}.html")
+        page = None if args.out is None else args.out / f"{self.name}.html"
+        with made_folder(args.out):
+            if page is not None:  # before a campaign that could then not be kept
+                require("report")
+                check_writable(page)
+            return self._run(chosen, seeds, page, args.json)
+
+    def _run(self, chosen: Sequence[Row], seeds: int, page: Path | None, json_file: str | None) -> int:
+        """Run the conditions, print and write what came of them, and return the exit status."""
+        from lever_cdkf.cli.progress import Progress
+        from lever_cdkf.cli.tables import print_tables
+
+        from ..acceptance import table
+
         with Progress(self.name) as progress:
             results = self.measure(chosen, seeds, progress.show)
         each = self.each if seeds > 1 else self.each.replace("pilots", "pilot")
@@ -112,8 +119,7 @@ class AcceptanceCommand(ABC, Generic[Row]):
         judged = sum(bool(result.condition.limits) for result in results)
         held = f"{judged - len(missed)} of {judged} conditions hold." if judged else "None of these has limits."
         say(held + (f" Missed: {', '.join(missed)}." if missed else ""))
-        page = None if args.out is None else args.out / f"{self.name}.html"
-        write_results(page, lambda: self.page(results, seeds), args.json, {"rows": table.rows(results)})
+        write_results(page, lambda: self.page(results, seeds), json_file, {"rows": table.rows(results)})
         return 1 if missed else 0
 
     def _chosen(self, args: argparse.Namespace) -> list[Row]:

@@ -106,16 +106,16 @@ def run(args: argparse.Namespace) -> int:
 
 def _run(plan: Plan, folder: Path, args: argparse.Namespace) -> Session:
     from lever_cdkf.cli.progress import Progress
-    from lever_cdkf.runtime.files import make_folder
+    from lever_cdkf.runtime.files import made_folder
 
     from ..campaign import spec
     from ..campaign.session import Session, connected, dashboard, run
 
-    make_folder(folder)
-    done = len(plan.done(folder))
-    if done and not args.resume:
-        raise LeverError(f"{args.out} holds {done} of the {plan.count} chunks of this campaign: add --resume")
-    spec.save(plan.spec, folder)
+    with made_folder(folder):
+        done = len(plan.done(folder))
+        if done and not args.resume:
+            raise LeverError(f"{args.out} holds {done} of the {plan.count} chunks of this campaign: add --resume")
+        spec.save(plan.spec, folder)
     if done == plan.count:
         return Session()
     with connected(args.scheduler, args.workers or os.cpu_count() or 1) as client, Progress("campaign") as progress:

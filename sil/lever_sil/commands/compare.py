@@ -12,12 +12,13 @@ from lever_cdkf.cli.progress import Progress
 from lever_cdkf.cli.tables import Row, add_json_option
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
-from lever_cdkf.runtime.files import make_folder
+from lever_cdkf.runtime.files import made_folder
 
 from .names import check_names, seed
 
 if TYPE_CHECKING:
     from ..study.compare.cases import Plan
+    from ..study.compare.run_cases import Task
 
 _DESCRIPTION = """\
 Runs the firmware's estimators and published ones on the same data and ranks them in each case: errors, errors against
@@ -127,9 +128,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _compare(args: argparse.Namespace) -> int:
     """Run all estimators that take part on all cases that were asked for."""
-    from lever_cdkf.cli.tables import print_tables
-
-    from ..study.compare import entrants, evaluation, run_cases, table, verdicts
+    from ..study.compare import entrants, run_cases
 
     if args.score is not None:
         entrants.enter(args.score)
@@ -139,8 +138,17 @@ def _compare(args: argparse.Namespace) -> int:
         raise LeverError("none of these estimators takes part in any of these cases; see `lever compare --list`")
     if idle := [name for name in args.estimators or () if name not in {task.entrant for task in todo}]:
         warn(f"not run, as none of these cases has it: {', '.join(idle)}; see `lever compare --list`")
-    if args.out is not None:
-        make_folder(args.out)  # before a campaign that could then not be kept
+    with made_folder(args.out):  # before a campaign that could then not be kept
+        _run(todo, args)
+    return 0
+
+
+def _run(todo: list[Task], args: argparse.Namespace) -> None:
+    """Run the tasks; print the figures, and write the files that were asked for."""
+    from lever_cdkf.cli.tables import print_tables
+
+    from ..study.compare import evaluation, run_cases, table, verdicts
+
     with Progress("compare") as progress:
         results = run_cases.run(todo, args.jobs, progress.show)
     rows = evaluation.judge(results)
@@ -171,7 +179,6 @@ def _compare(args: argparse.Namespace) -> int:
             outputs.finish()
         drawn = "figures as .pdf, .svg and .csv, " if figures else ""
         say(f"Written to {args.out}: compare.html, compare.csv, {drawn}provenance.json")
-    return 0
 
 
 def _drawn(args: argparse.Namespace) -> tuple[Plan, list[str]]:

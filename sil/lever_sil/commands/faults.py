@@ -10,13 +10,15 @@ from lever_cdkf.cli.layout import say
 from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
-from lever_cdkf.runtime.files import make_folder
+from lever_cdkf.runtime.files import made_folder
 from lever_cdkf.text.counts import counted
 
 from .names import check_names
 from .results import write_results
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..faults.rows import Row
 
 _DESCRIPTION = """\
@@ -68,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     """`lever faults`."""
     from lever_cdkf.cli.tables import print_tables
 
-    from ..faults import faults_page, matrix, table
+    from ..faults import table
     from ..faults.rows import ROWS
 
     if args.list:
@@ -83,7 +85,16 @@ def run(args: argparse.Namespace) -> int:
         raise LeverError(f"--seeds {seeds}: must be from 1 to 1000")
     if args.out is not None:
         require("report")
-        make_folder(args.out)
+    with made_folder(args.out):
+        return _run(chosen, seeds, args)
+
+
+def _run(chosen: Sequence[Row], seeds: int, args: argparse.Namespace) -> int:
+    """Fly the faults, print and write what came of them, and return the exit status."""
+    from lever_cdkf.cli.tables import print_tables
+
+    from ..faults import faults_page, matrix, table
+
     with Progress("faults") as progress:
         results = matrix.run(chosen, seeds, progress.show)
     print_tables({f"{counted(seeds, 'random pilot')} a fault, the worst of them": table.lines(results)})

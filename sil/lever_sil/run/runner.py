@@ -18,7 +18,7 @@ from lever_cdkf.exports.signal_files import SignalFiles
 from lever_cdkf.results.summary import SimulationSummary, text
 from lever_cdkf.results.trace import Trace
 from lever_cdkf.runtime.extras import missing
-from lever_cdkf.runtime.files import Outputs, make_folder, write_text, writing
+from lever_cdkf.runtime.files import Outputs, made_folder, write_text, writing
 from lever_cdkf.runtime.provenance import provenance
 from numpy.typing import NDArray
 
@@ -99,25 +99,25 @@ def simulate(
     if not isinstance(scenario, Scenario):
         raise LeverError(f"scenario is a {type(scenario).__name__}: give what load_scenario({scenario!r}) returns")
     start = clock.perf_counter()
-    if out_dir is not None:
-        make_folder(out_dir)  # before a run that could then not be kept
-    if bus is None and not realtime:
-        recording = in_process.run(scenario, channel, progress, snapshots)
-    else:
-        with ExitStack() as stack:
+    with ExitStack() as stack:
+        stack.enter_context(made_folder(out_dir))  # before a run that could then not be kept
+        if bus is None and not realtime:
+            recording = in_process.run(scenario, channel, progress, snapshots)
+        else:
             config, aircraft = scenario.config, scenario.known_aircraft
             estimator = bus or stack.enter_context(
                 LeverBus(channel, config=config, aircraft=aircraft, snapshots=snapshots)
             )
             recording = loop.run(scenario, estimator, realtime=realtime, progress=progress)
             recording.has_aircraft = isinstance(estimator, LeverBus)
-    _check_bounded(recording)
-    frames = recording.frames()
-    columns = columns_of(recording, frames)
-    result = SimulationResult(columns, summary.build(recording, columns).timed(clock.perf_counter() - start), frames)
-    if out_dir is not None:
-        files = _Files(out_dir, channel, formats, inputs, story)
-        files.write(result, published(recording, frames))
+        _check_bounded(recording)
+        frames = recording.frames()
+        columns = columns_of(recording, frames)
+        judged = summary.build(recording, columns).timed(clock.perf_counter() - start)
+        result = SimulationResult(columns, judged, frames)
+        if out_dir is not None:
+            files = _Files(out_dir, channel, formats, inputs, story)
+            files.write(result, published(recording, frames))
     return result
 
 

@@ -21,6 +21,7 @@ from lever_cdkf.cli.progress import Progress
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime import interrupts
 from lever_cdkf.runtime.files import Outputs
+from python.conftest import Session
 
 Act = Callable[[Callable[[], None]], int]
 LINE = "lever: interrupted\n"
@@ -94,6 +95,38 @@ def test_a_lost_one_is_found_before_files_are_put_into_place(
 
     assert act(run) == 130
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "sim steady",
+        "replay LOG",
+        "replay LOG --each",
+        "compare --quick",
+        "figures --only bode",
+        "envelope --only steady --seeds 1",
+        "bounce --only alarm --seeds 1",
+        "faults --quick",
+    ],
+)
+def test_an_interrupted_command_leaves_no_folder(
+    command: str, number: int, session: Session, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While its first progress is shown; made folders have one above them that is made, too."""
+
+    def come(*_: object) -> None:
+        (come_to,) = tmp_path.rglob("out")  # a place for what comes of it, before the work
+        assert come_to.is_dir()
+        signal.raise_signal(number)
+
+    monkeypatch.setattr(Progress, "show", come)
+    before = signal.getsignal(number)
+    words = command.replace("LOG", str(session.log)).split()
+    assert main([*words, "--out", str(tmp_path / "new" / "out")]) == 130
+    assert list(tmp_path.iterdir()) == []
+    assert signal.getsignal(number) is before
 
 
 @lost
