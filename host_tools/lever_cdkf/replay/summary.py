@@ -15,7 +15,7 @@ from ..results.nis import Innovations, Nis, freedom
 from ..results.summary import Estimate, Mapped, RecordingSummary, ReplaySummary
 from ..results.trace import CONVERGED_AFTER, MEASURED, Trace
 from ..results.whiteness import Whiteness
-from ..text.counts import in_percent
+from ..text.counts import in_percent, rounded_down
 from . import proof
 from .reduction import Groups
 
@@ -134,7 +134,7 @@ def _too_short(summary: ReplaySummary) -> str:
     duration = summary.recording.duration_s
     if summary.flagged_share is not None or not duration < CONVERGED_AFTER or failure(summary):
         return ""
-    return f"Too short to judge: {duration:.3g} s of estimates, {CONVERGED_AFTER:g} s are needed."
+    return f"Too short to judge: {rounded_down(duration, 3):g} s of estimates, {CONVERGED_AFTER:g} s are needed."
 
 
 def _time_estimated(summary: ReplaySummary) -> list[str]:

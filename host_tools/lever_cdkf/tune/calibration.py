@@ -26,6 +26,7 @@ from ..firmware.config import setting
 from ..firmware.settings_file import Assignments, make_config
 from ..numeric.arrays import Array
 from ..results import whiteness
+from ..text.counts import rounded_down
 from .likelihood import LEARNT_LEAST, Likelihood, noise_as_set
 from .search import NOISE, logarithmic_range
 
@@ -156,8 +157,8 @@ def _missing(likelihood: Likelihood, assignments: Assignments) -> str:
         return f"with model {model} they cannot be known."
     if torque < DITHER_LEAST:
         return (
-            f"without dither they cannot be known. The motor torque has {torque:.2g} N m rms above {DITHER_FROM:g} Hz; "
-            f"{DITHER_LEAST:g} N m are needed."
+            f"without dither they cannot be known. The motor torque has {rounded_down(torque, 4):g} N m rms above "
+            f"{DITHER_FROM:g} Hz; {DITHER_LEAST:g} N m are needed."
         )
     if likelihood.learnt(noise_as_set(assignments)) < LEARNT_LEAST:
         return "the lever hardly moves."

@@ -16,6 +16,7 @@ from ..errors import LeverError
 from ..firmware.innovations import innovations
 from ..firmware.settings_file import Assignments, make_config
 from ..numeric.arrays import Array
+from ..text.counts import rounded_down
 from .recording import Recording
 
 START = 10.0
@@ -50,7 +51,8 @@ class Likelihood:
         """Raise LeverError for a recording that is too short."""
         duration = self.recording.duration + self.recording.period  # n samples last n periods
         if duration < SHORTEST - 0.5 * self.recording.period:
-            raise LeverError(f"too short to tune on: {duration:.5g} s of samples; at least {SHORTEST:g} s are needed")
+            there = f"{rounded_down(duration, 3):g} s of samples"
+            raise LeverError(f"too short to tune on: {there}; at least {SHORTEST:g} s are needed")
         time, begin = self.recording.time, min(START, START_SHARE * duration)
         split = begin + (1.0 - self.held_out) * (duration - begin)
         self.tuned_on: Array = (time >= begin) & (time < split)

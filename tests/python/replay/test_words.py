@@ -91,7 +91,9 @@ def test_why_frames_are_refused(summary: ReplaySummary) -> None:
 
 
 def test_too_short_to_judge(summary: ReplaySummary) -> None:
-    assert "Too short to judge: 6 s of estimates, 15 s are needed." in verdict(summary)
+    assert "Too short to judge: 5.999 s of estimates, 15 s are needed." in verdict(summary)
+    almost = replace(summary, recording=replace(summary.recording, duration_s=14.9996))
+    assert "Too short to judge: 14.999 s of estimates, 15 s are needed." in verdict(almost)
     assert "Too short" not in verdict(replace(summary, flagged_share=0.0))
     long = replace(summary, recording=replace(summary.recording, duration_s=15.0))
     assert "Too short" not in verdict(long)

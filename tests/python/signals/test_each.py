@@ -55,7 +55,7 @@ def test_a_log_that_is_too_short_to_judge_says_so(folder: Path, tmp_path: Path) 
     arguments = ["--dbc", str(folder / "foreign.dbc"), "--map", *MAPPED, "--length", "6", "-o", str(tmp_path)]
     assert main(["replay", str(folder / "flight.log"), *arguments]) == 0
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert "Too short to judge: 6 s of estimates, 15 s are needed." in summary["verdict"]
+    assert "Too short to judge: 5.998 s of estimates, 15 s are needed." in summary["verdict"]
     assert summary["flagged_share"] is None
     assert summary["fault_shares"]
 

@@ -148,6 +148,8 @@ def test_what_is_too_short() -> None:
     Likelihood(recording(20.0))
     with pytest.raises(LeverError, match=r"^too short to tune on: 19\.9 s of samples; at least 20 s are needed$"):
         Likelihood(recording(19.9))
+    with pytest.raises(LeverError, match=r"^too short to tune on: 19\.999 s of samples; at least 20 s are needed$"):
+        Likelihood(recording(19.9995, 0.0005))
 
 
 def changed(likelihood: Likelihood, monkeypatch: pytest.MonkeyPatch, *spans: tuple[float, float]) -> bool:
