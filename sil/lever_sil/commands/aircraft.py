@@ -105,9 +105,12 @@ def run(args: argparse.Namespace) -> int:
 
 def _say(name: str, changes: list[str]) -> None:
     """Say what has become of a file, on standard error. Raise LeverError."""
-    from ..aircraft.aircraft import FILES
+    from lever_cdkf.cli.layout import warn
+
+    from ..aircraft.aircraft import FILES, WORST_FIT
     from ..aircraft.state_space import read
     from ..aircraft.tabulated import Tabulated, is_response
+    from ..aircraft.vector_fitting import cross_validated
 
     path, given = Path(name), _of_aircraft(changes)
     if path.suffix.lower() not in FILES:
@@ -129,6 +132,13 @@ def _say(name: str, changes: list[str]) -> None:
             f"{abs(z):8.4g} {math.degrees(math.atan2(z.imag, z.real)):6.1f}°" for z in (tabulated.values[i], fitted[i])
         )
         print(f"  {tabulated.frequency[i]:6.3g} Hz  {'  '.join(cells)}  {100.0 * error[i]:.2g} %", file=sys.stderr)
+    for what, values in (("response", tabulated.values), ("seat over accelerometer", tabulated.seat)):
+        if values is not None and (off := cross_validated(s, values)).max() > WORST_FIT:
+            warn(
+                f"{name}: at {tabulated.frequency[off.argmax()]:.4g} Hz the {what} is off by {100.0 * off.max():.0f} % "
+                "from what the other frequencies say, and table and fit follow it: measure it again, or leave that "
+                "row out"
+            )
 
 
 def _number(written: str) -> float:

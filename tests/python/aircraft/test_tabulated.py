@@ -107,3 +107,21 @@ def test_a_table_that_does_not_fly_is_written_with_a_warning_and_is_no_state_spa
     assert "which does not fly" in said
     assert "which does not fly" in refused("aircraft", path, "--export", tmp_path / "craft.csv")
     assert sorted(each.name for each in tmp_path.iterdir()) == ["some.csv", "some.response"]
+
+
+@pytest.mark.parametrize(("column", "what"), [(1, "response"), (3, "seat over accelerometer")])
+def test_a_value_that_the_others_contradict_is_named(column: int, what: str, tmp_path: Path, lever: Run) -> None:
+    """The fit to all says nothing of it, as it goes through every value."""
+    craft = aircraft.load("uh60_like", mode=[{"frequency": "5.5 Hz", "seat": "-1 1", "accelerometer": "0.2 1"}])
+    s = 2j * np.pi * FREQUENCY.astype(np.complex128)
+    response, seat = Coupled(craft, 0.5).response(s), craft.seat_transfer(s)
+    columns = np.array((FREQUENCY, response.real, response.imag, seat.real, seat.imag))
+    path = tmp_path / "response.csv"
+    for gain, said in ((1.0, ""), (1.15, ""), (1.3, f"at {FREQUENCY[20]:.4g} Hz the {what} is off by 30 % ")):
+        changed = columns.copy()
+        changed[column : column + 2, 20] *= gain
+        np.savetxt(path, changed.T, delimiter=",")
+        status, _, shown = lever("aircraft", path, "-o", tmp_path / "some.response")
+        assert (status, "warning" in shown) == (0, bool(said))
+        assert said in shown
+        assert float(shown.split("off by ")[1].split(" %")[0]) < 1.0
