@@ -13,6 +13,7 @@ from lever_cdkf.cli.tables import Row, add_json_option
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
 from lever_cdkf.runtime.files import made_folder
+from lever_cdkf.text.counts import counted
 
 from .names import check_names, seed
 
@@ -72,6 +73,7 @@ _SCORED = 20
 _BESIDE = ("dual_shipped", "joint_ekf")
 """Beside a --score."""
 _LIST = "lever compare --list"
+_PROVENANCE = "provenance.json"
 
 
 def add_parser(subparsers: argparse._SubParsersAction[Any]) -> None:
@@ -165,20 +167,22 @@ def _run(todo: list[Task], args: argparse.Namespace) -> None:
         from ..study.compare import compare_page, printed
 
         with Outputs(args.out) as outputs:
-            write_text(outputs.path("compare.csv"), table.csv_text(rows))
-            names = ["compare.csv", "compare.html"]
             origin = provenance()
             page, figures = compare_page.build(results, rows, by_case, claims, tables)
-            write_text(outputs.path("compare.html"), with_provenance(page, origin))
-            for name, content in printed.files(figures, origin):
-                names.append(name)
+            files = {
+                "compare.html": with_provenance(page, origin).encode(),
+                "compare.csv": table.csv_text(rows).encode(),
+            }
+            drawn = dict(printed.files(figures, origin))
+            for name, content in (files | drawn).items():
                 path = outputs.path(name)
                 with writing(path):
                     path.write_bytes(content)
-            write_text(outputs.path("provenance.json"), origin.with_outputs(outputs.written(*names)).text())
+            write_text(outputs.path(_PROVENANCE), origin.with_outputs(outputs.written(*files, *drawn)).text())
             outputs.finish()
-        drawn = "figures as .pdf, .svg and .csv, " if figures else ""
-        say(f"Written to {args.out}: compare.html, compare.csv, {drawn}provenance.json")
+        kinds = ", ".join(dict.fromkeys(Path(name).suffix for name in drawn))
+        as_drawn = [f"{counted(len(figures), 'figure')} as {kinds}"] if figures else []
+        say(f"Written to {args.out}: {', '.join([*files, *as_drawn, _PROVENANCE])}")
 
 
 def _drawn(args: argparse.Namespace) -> tuple[Plan, list[str]]:

@@ -590,6 +590,8 @@ def test_a_small_campaign(lever: Run, tmp_path: Path, monkeypatch: pytest.Monkey
     drawn = figures(Reader((out / "compare.html").read_text()))
     pictures = [f"{name}.{kind}" for name in drawn for kind in ("pdf", "svg", "csv")]
     assert {path.name for path in out.iterdir()} == {"compare.csv", "compare.html", "provenance.json", *pictures}
+    named = f"compare.html, compare.csv, {len(drawn)} figures as .pdf, .svg, .csv, provenance.json"
+    assert said.endswith(f"Written to {out}: {named}\n")
     lines = list(csv.DictReader(io.StringIO((out / "compare.csv").read_text())))
     assert len(lines) == 5
     walk = next(line for line in lines if line["case"].startswith("lever") and line["estimator"] == "joint")
