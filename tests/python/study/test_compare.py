@@ -614,8 +614,8 @@ def test_a_logarithmic_axis_is_one_in_print() -> None:
     assert axes.get_xscale() == "log"
 
 
-def test_a_figure_for_print_is_what_the_page_shows() -> None:
-    """Lanes of two estimators, of which one has no error, and a band about a curve."""
+def test_a_figure_for_print_is_what_the_page_shows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lanes of two estimators, of which one has no error, and a band about a curve; each is laid out once."""
     lanes: dict[str, Any] = {"tickvals": [0, 1], "ticktext": ["joint", "rls"], "range": [1.5, -0.5]}
     figure = drawing.Figure([lanes], drawing.axis("error", type="log"), 200, over_time=False)
     marker = {"color": ["@estimate", "@joint"], "size": 8, "symbol": "square"}
@@ -629,11 +629,20 @@ def test_a_figure_for_print_is_what_the_page_shows() -> None:
     curve.add(*drawing.band(x, 2.0 + x, 4.0 + x, "middle half", "estimate-band"))
     curve.add(drawing.line(x, 3.0 + x, "median", "estimate"))
     curve.level(5.0)
-    for shown in (figure, curve):
-        svg = printed.render(shown.spec(), "name", "svg", provenance()).decode()
+    laid_out = []
+
+    def lay_out(*what: Any) -> Any:
+        laid_out.append(what)
+        return sheet_of(*what)
+
+    monkeypatch.setattr(printed, "charts", lay_out)
+    written = dict(printed.files({"figure": figure.spec(), "curve": curve.spec()}, provenance()))
+    assert len(laid_out) == 2
+    for name, shown in (("figure", figure), ("curve", curve)):
+        svg = written[f"{name}.svg"].decode()
         width = re.search(r'width="([\d.]+)pt"', svg)
         assert width is not None
         assert float(width[1]) == pytest.approx(180 / 25.4 * 72, abs=0.1)
         words = "".join(ElementTree.fromstring(svg).itertext())
         assert all(name in words for name in (("joint", "rls", "error") if shown is figure else ("median", "time [s]")))
-        assert printed.render(shown.spec(), "name", "pdf", provenance()).startswith(b"%PDF")
+        assert written[f"{name}.pdf"].startswith(b"%PDF")

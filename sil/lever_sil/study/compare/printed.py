@@ -19,12 +19,6 @@ COLUMNS = ("series", "lane", "x", "y", "error")
 _PIXELS_AN_INCH = 110.0
 
 
-def render(figure: Spec, name: str, kind: str, provenance: Provenance) -> bytes:
-    """Return the file, two columns of a journal wide."""
-    sheet = charts([("", figure)], figure["layout"]["height"] / _PIXELS_AN_INCH, "double")
-    return pictures.render(sheet, kind, name, provenance)
-
-
 def table(figure: Spec) -> str:
     """CSV, a row for each point."""
     lanes = figure["layout"]["yaxis"].get("ticktext", ())
@@ -42,8 +36,9 @@ def table(figure: Spec) -> str:
 
 
 def files(figures: Mapping[str, Spec], provenance: Provenance) -> Iterator[tuple[str, bytes]]:
-    """Yield name and content of each."""
+    """Yield name and content of each; pictures are two columns of a journal wide."""
     for name, figure in figures.items():
+        sheet = charts([("", figure)], figure["layout"]["height"] / _PIXELS_AN_INCH, "double")
         for kind in KINDS:
-            yield f"{name}.{kind}", render(figure, name, kind, provenance)
+            yield f"{name}.{kind}", pictures.render(sheet, kind, name, provenance)
         yield f"{name}.csv", table(figure).encode()
