@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 
+from lever_cdkf.firmware.sample_clock import CLOCK_WRONG
 from lever_sil.envelope.conditions import CONDITIONS
 from lever_sil.envelope.rules import RULES
 from lever_sil.faults.rows import ROWS
-from quality import constants
+from quality import constants, definitions
 
 _ROWS = {*CONDITIONS, *RULES, *ROWS}
 
@@ -32,6 +33,12 @@ def test_the_table_is_not_empty_and_knows_units_from_rows() -> None:
     assert len(found) > 150
     assert found["AWAKE"].rows == ["rest_120s", "freed"]
     assert found["KINEMATICS_CORNER"].rows == []
+
+
+def test_host_and_firmware_take_the_same_clock_for_wrong() -> None:
+    """As both say: the evidence shows as CALIBRATION, and the commands name another sample_period."""
+    thresholds = {name: threshold for name, threshold, *_ in definitions.rows("evidence")}
+    assert float(thresholds["clock"]) == CLOCK_WRONG
 
 
 def _is_below(constant: constants.Constant) -> bool:

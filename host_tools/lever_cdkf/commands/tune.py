@@ -99,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
         require("report")
 
     from ..cli.progress import Progress
+    from ..firmware.settings_file import make_config
     from ..tune import validation
     from ..tune.calibration import calibrate
     from ..tune.likelihood import Likelihood
@@ -107,7 +108,8 @@ def run(args: argparse.Namespace) -> int:
 
     before = _settings(args)
     with Progress("tune") as progress:
-        recording = read(args.log, options.chosen_reading(args, args.log[0]), progress.show)
+        set_to = make_config(before).settings["sample_period"]
+        recording = read(args.log, options.chosen_reading(args, args.log[0]), progress.show, set_to)
         before = _as_recorded(before, recording)
         likelihood = Likelihood(recording, args.held_out)
         likelihood.progress = progress.show
@@ -150,6 +152,7 @@ def _settings(args: argparse.Namespace) -> Assignments:
 def _as_recorded(assignments: Assignments, recording: Recording) -> Assignments:
     """With what the log chooses that was not chosen here, and with its sample_period."""
     from ..firmware.config import Config
+    from ..firmware.sample_clock import is_other_period
     from ..firmware.settings_file import make_config
 
     for note in recording.notes:
@@ -162,7 +165,7 @@ def _as_recorded(assignments: Assignments, recording: Recording) -> Assignments:
         _note(f"by COMMAND in the log, {name} is {value}")
     assignments = {**chosen, **assignments}
     set_to = make_config(assignments).settings["sample_period"]
-    if abs(recording.period - set_to) <= 0.04 * set_to:
+    if not is_other_period(recording.period, set_to):
         return assignments
     _note(
         f"the log has a sample each {1e3 * recording.period:g} ms: sample_period becomes that (was {1e3 * set_to:g} ms)"

@@ -8,6 +8,7 @@ from ..can.estimator_frames import why_refused
 from ..can.logs import incomplete
 from ..firmware.native import Config, enum_names
 from ..firmware.quantities import quantities
+from ..firmware.sample_clock import is_other_period
 from ..results import bounce, nis, trust, whiteness
 from ..results.bounce import Bounce
 from ..results.faults import OPTIONAL, FaultCounts
@@ -172,7 +173,7 @@ def _troubles(summary: ReplaySummary) -> list[str]:
     if recording.model_changes:
         troubles.append("A COMMAND in the log changes the model on the way; the estimates of the first one are shown.")
     step, period = recording.typical_step_s, summary.estimator.settings["sample_period"]
-    if step and not 0.95 < step / period < 1.05:
+    if step and is_other_period(step, period):
         troubles.append(
             f"Samples come every {1e3 * step:g} ms, but sample_period is {1e3 * period:g} ms: add "
             f"--set sample_period={step:.4g}."

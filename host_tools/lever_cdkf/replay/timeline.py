@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..firmware.sample_clock import period_of
 from ..numeric.arrays import IntArray
 
 WRAP = 1 << 32
@@ -58,7 +59,7 @@ class Timeline:
         steps = self._steps(np.diff(recorded_us, prepend=recorded_0), np.diff(sender, prepend=sender_0))
         if self._last is None:
             self.clocks.late -= 1  # the first sample is no step
-            self.typical_step_us = round(_typical(steps[1:], self._period_us)) if len(steps) > 1 else 0
+            self.typical_step_us = round(period_of(steps[1:], self._period_us)) if len(steps) > 1 else 0
         self._last = int(recorded_us[-1]), int(sender[-1])
         self._note_gaps(steps)
         time_us = self._now + np.cumsum(steps)
@@ -86,15 +87,3 @@ class Timeline:
         gaps = steps[steps > GAP * self._period_us]
         self.clocks.gaps += len(gaps)
         self.clocks.longest_gap_s = max(self.clocks.longest_gap_s, float(gaps.max()) / 1e6 if len(gaps) else 0.0)
-
-
-def _typical(steps: IntArray, period: float) -> float:
-    """Return the step of most samples or, where that is near the period, the mean one as the firmware judges a clock.
-
-    That is the period, unless steps are longer though each long one is that of lost samples, or shorter though none is.
-    """
-    most, mean = float(np.median(steps)), float(steps.mean())
-    if not 0.7 < most / period < 1.4 and abs(mean - period) > 0.05 * period:
-        return most
-    longer = float(steps.sum() / np.maximum(np.rint(steps / period), 1.0).sum())
-    return longer if longer > period else min(mean, period)

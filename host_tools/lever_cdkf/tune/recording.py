@@ -15,6 +15,7 @@ from ..errors import LeverError
 from ..firmware.config import Config, setting
 from ..firmware.estimator import Health
 from ..firmware.innovations import FRAME, samples_of
+from ..firmware.sample_clock import period_of
 from ..numeric.arrays import Array
 from ..signals.mapped_frames import MappedFrames, frames_for_estimator
 from ..signals.reading import Reading
@@ -27,7 +28,7 @@ class Recording:
     samples: Array
     """Of dtype innovations.SAMPLE."""
     period: float
-    """Between two samples: the median [s]."""
+    """Between two samples, as period_of() says [s]."""
     bus: str
     choices: dict[str, str]
     """Of model, preload, estimator and adaptation, by COMMAND in the log; the firmware's defaults without."""
@@ -61,8 +62,12 @@ def read(
     paths: Sequence[str | os.PathLike[str]],
     reading: Reading | None = None,
     progress: Callable[[int, int, str], None] | None = None,
+    period: float = setting("sample_period").default,
 ) -> Recording:
-    """Return the samples that `reading` says, or all of lever.dbc; raise LeverError."""
+    """Return the samples that `reading` says, or all of lever.dbc; raise LeverError.
+
+    `period` [s] is the sample_period that is set.
+    """
     reading = reading or Reading(is_of_lever_dbc=True)
     traffic = frames_for_estimator(list(map(str, paths)), reading)
     log, inputs = traffic.recording, [codec.message(name).frame_id for name in INPUTS]
@@ -77,10 +82,10 @@ def read(
         raise LeverError(f"{name}: samples on more than one bus: choose by --channel {buses}")
     notes = [incomplete(log.ends_early)] if log.ends_early else []
     notes += traffic.loaded.notes if isinstance(traffic, MappedFrames) else ()
-    return replace(_recording(np.concatenate(pieces), str(traffic.channel), name), notes=tuple(notes))
+    return replace(_recording(np.concatenate(pieces), str(traffic.channel), name, period), notes=tuple(notes))
 
 
-def _recording(frames: Array, bus: str, log: str) -> Recording:
+def _recording(frames: Array, bus: str, log: str, set_to: float) -> Recording:
     received = np.zeros(len(frames), FRAME)
     for field in ("id", "length", "data"):
         received[field] = frames[field]
@@ -88,7 +93,7 @@ def _recording(frames: Array, bus: str, log: str) -> Recording:
     if len(samples) < 2:
         why = why_refused(health.corrupt, health.late) or "it holds no more"
         raise LeverError(f"{log}: too few samples to tune on, {len(samples)}: {why}")
-    period = float(np.median(_steps(samples))) * 1e-6
+    period = 1e-6 * period_of(np.maximum(_steps(samples), 0), 1e6 * set_to)
     lowest, highest = setting("sample_period").least, setting("sample_period").greatest
     if lowest <= period <= highest:  # so that samples at the log's own rate are not counted as lost
         health = samples_of(received, Config(settings={"sample_period": period}))[2]

@@ -13,8 +13,11 @@ import numpy as np
 import pytest
 from lever_cdkf.can import codec
 from lever_cdkf.cli.main import main
+from lever_cdkf.commands.tune import _as_recorded
+from lever_cdkf.firmware.native import Config
 from lever_cdkf.firmware.settings_file import make_config, read_assignments
-from lever_cdkf.tune import calibration
+from lever_cdkf.replay.engine import Options, replay
+from lever_cdkf.tune import calibration, recording
 from lever_cdkf.tune.calibration import NAMES
 from python.conftest import Refused, Run
 from python.report.reading import figures, read, unpack
@@ -137,6 +140,24 @@ def test_other_sample_periods_are_noticed(tmp_path: Path, lever: Run) -> None:
     assert read_assignments(tmp_path / "slow.settings")["sample_period"] == 0.01
 
 
+@pytest.mark.parametrize(
+    ("period_us", "resolution_us", "set_to"), [(1300, 1000, 1.3e-3), (1045, 1, 1e-3), (1055, 1, 1e-3)]
+)
+def test_tune_and_replay_find_the_same_period(
+    period_us: int, resolution_us: int, set_to: float, tmp_path: Path
+) -> None:
+    """Also where most of its stamps are a millisecond apart, and up to the same difference from sample_period."""
+    log, assignments = tmp_path / "some.log", {"sample_period": set_to}
+    write_log(log, 3000, period_us, resolution_us=resolution_us)
+    summary = replay([log], Options(Config(settings=assignments)))
+    recorded = recording.read([log], period=set_to)
+    assert recorded.period == pytest.approx(1e-6 * period_us, rel=1e-3)
+    assert recorded.period == pytest.approx(summary.recording.typical_step_s, abs=1e-6)
+    is_other = "Samples come every" in summary.verdict
+    assert is_other == (period_us == 1055)
+    assert (_as_recorded(assignments, recorded) != assignments) == is_other
+
+
 def test_the_next_command_reads_the_log_as_this_one(tmp_path: Path, lever: Run) -> None:
     """From the same bus of it, and by the same identifiers."""
     log, out = tmp_path / "two buses.log", tmp_path / "my.settings"
@@ -170,9 +191,18 @@ def test_choices_are_those_of_the_log(tmp_path: Path, lever: Run) -> None:
 
 
 def write_log(
-    path: Path, count: int, period_us: int = 1000, bus: str = "can0", counts: bool = True, offset: int = 0
+    path: Path,
+    count: int,
+    period_us: int = 1000,
+    bus: str = "can0",
+    counts: bool = True,
+    offset: int = 0,
+    resolution_us: int = 1,
 ) -> None:
-    """candump's format: a lever that swings a little, with noise; `counts`: the E2E counters do."""
+    """candump's format: a lever that swings a little, with noise; `counts`: the E2E counters do.
+
+    `resolution_us` is that of the sender's clock.
+    """
     lever_sample, base_sample = codec.encoder("LEVER_SAMPLE"), codec.encoder("BASE_SAMPLE")
     noise = np.random.default_rng(1).standard_normal((count, 3)) * (1e-3, 1e-2, 1.0)
     with path.open("w", encoding="ascii") as log:
@@ -180,7 +210,7 @@ def write_log(
             time = k * period_us
             counter = k if counts else 3
             lever = lever_sample(counter, 0.35 + theta, theta_dot, 0.0)
-            lines = (0x110 + offset, lever), (0x111 + offset, base_sample(counter, z_ddot, time))
+            lines = (0x110 + offset, lever), (0x111 + offset, base_sample(counter, z_ddot, time - time % resolution_us))
             for identifier, data in lines:
                 log.write(f"({time / 1e6:.6f}) {bus} {identifier:03X}#{data.hex().upper()}\n")
 
