@@ -233,7 +233,8 @@ class _Replay:
             comparison=None if self._comparison is None else self._comparison.summary(),
             snapshots=self._proof.summary(),
         )
-        summary = replace(summary, passed=not failure(summary), warning=warning(summary, self._options.tune_command))
+        said = warning(summary, self._options.tune_command, figures.evidence)
+        summary = replace(summary, passed=not failure(summary), warning=said)
         return replace(summary, verdict=verdict(summary))
 
     def _estimator(self) -> summaries.Estimator:

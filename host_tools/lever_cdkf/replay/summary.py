@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from ..can.estimator_frames import why_refused
@@ -9,7 +11,7 @@ from ..can.logs import incomplete
 from ..firmware.native import Config, enum_names
 from ..firmware.quantities import quantities
 from ..firmware.sample_clock import is_other_period
-from ..results import bounce, nis, trust, whiteness
+from ..results import bounce, nis, ratios, trust, whiteness
 from ..results.bounce import Bounce
 from ..results.faults import OPTIONAL, FaultCounts
 from ..results.nis import Innovations, Nis, freedom
@@ -34,6 +36,8 @@ class Figures:
         self._modes: dict[int, int] = {}
         self.bounce = Bounce(self._period)
         self.faults, self._early = FaultCounts(), FaultCounts()
+        self.evidence: Counter[str] | None = None
+        """Of calibration; None: not known."""
         self._measured: set[str] = set()
         self._last: dict[str, float] = {}
         self._extremes: dict[str, tuple[float, float]] = {}
@@ -55,6 +59,8 @@ class Figures:
         without = tuple(OPTIONAL.keys() - self._measured)
         self.faults.add(trace["faults"][judged], without)
         self._early.add(trace["faults"][~judged], without)
+        if (evidence := ratios.behind_calibration(trace, judged)) is not None:
+            self.evidence = (self.evidence or Counter()) + evidence
         for name in (each.column(kind) for each in self._quantities for kind in ("estimate", "sigma")):
             finite = trace[name][np.isfinite(trace[name])]
             if len(finite):
@@ -123,10 +129,10 @@ def verdict(summary: ReplaySummary) -> str:
     return " ".join(sentence for sentence in sentences if sentence)
 
 
-def warning(summary: ReplaySummary, tune_command: str) -> str:
+def warning(summary: ReplaySummary, tune_command: str, evidence: Counter[str] | None = None) -> str:
     """Return what the estimator says against its estimates, and what to do; `tune_command` tunes the log."""
-    said = trust.warning(summary.fault_shares, summary.flagged_share)
-    step = trust.next_step(summary.fault_shares, tune_command)
+    said = trust.warning(summary.fault_shares, summary.flagged_share, evidence)
+    step = trust.next_step(summary.fault_shares, tune_command, evidence)
     return f"{said} Next: {step}." if said and step else said
 
 

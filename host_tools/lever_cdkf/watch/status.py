@@ -7,6 +7,7 @@ import math
 from ..can import codec
 from ..firmware.estimator import TEST_RATIOS
 from ..firmware.library import enum_names, enum_words
+from ..results import trust
 from .picture import Picture
 from .sources import Source
 
@@ -147,5 +148,9 @@ def faults(picture: Picture) -> list[str]:
     """Return the faults of the estimator and its machine, in words."""
     machine = picture.platform_faults()
     named = [name for name in picture.faults() if not (machine and name == "platform")]
-    texts = [enum_words("lever_fault")[name] for name in named]
+    numbered = picture.test_ratios()
+    ratios = {TEST_RATIOS[key]: ratio for key, ratio in numbered.items() if key < len(TEST_RATIOS)}
+    evidence = {name: ratios[name] for name in trust.EVIDENCE if ratios.get(name, 0.0) > 1.0} if ratios else None
+    step = trust.next_step({"calibration": 1.0}, "`lever tune` finds what is stated wrong from a log", evidence)
+    texts = [trust.in_words(name, evidence, *([step] if name == "calibration" and evidence else [])) for name in named]
     return texts + [f"machine: {enum_words('lever_platform_fault')[name]}" for name in machine or ()]

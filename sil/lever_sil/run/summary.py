@@ -17,6 +17,7 @@ from lever_cdkf.numeric.arrays import BoolArray, FloatArray
 from lever_cdkf.results import bounce, nis, summary, trust, whiteness
 from lever_cdkf.results.faults import FaultCounts
 from lever_cdkf.results.nis import Innovations, Nis, freedom
+from lever_cdkf.results.ratios import behind_calibration
 from lever_cdkf.results.summary import (
     Estimator,
     Firmware,
@@ -74,7 +75,8 @@ def build(recording: Recording, trace: Trace) -> SimulationSummary:
         missed=missed,
         simulated_time_s=count * scenario.period,
     )
-    summary = replace(summary, warning=trust.warning(fault_shares, flagged_share))
+    evidence = behind_calibration(trace, judged_samples(scenario, trace["time_s"]))
+    summary = replace(summary, warning=trust.warning(fault_shares, flagged_share, evidence))
     return replace(summary, verdict=" ".join(filter(None, (summary.warning, _verdict(summary)))))
 
 

@@ -12,6 +12,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from lever_cdkf.errors import LeverError
+from lever_cdkf.firmware.config import Config
 from lever_cdkf.firmware.quantities import quantities, recorded_name
 from lever_cdkf.numeric.arrays import FloatArray
 from lever_cdkf.replay import proof
@@ -27,7 +28,7 @@ from lever_cdkf.results import summary as summaries
 from lever_cdkf.results.summary import Difference, Mapped, MessageCounts, ReplaySummary, Snapshots, Stability
 from lever_cdkf.signals.reading import Reading, Table
 from python.conftest import Run as Command
-from python.conftest import Session
+from python.conftest import Session, simulated
 from python.report.reading import Reader
 
 
@@ -137,6 +138,17 @@ def test_the_warning_says_what_to_do(summary: ReplaySummary) -> None:
     assert warning(warned, "lever tune x.log").endswith(" Next: lever tune x.log.")
     assert warning(summary, "lever tune x.log") == ""
     assert verdict(replace(summary, warning="Do not.")).startswith("Do not. ")
+
+
+def test_a_clock_that_is_wrong_is_named_as_the_evidence_of_calibration(tmp_path: Path) -> None:
+    log = simulated("steady", tmp_path, "duration=18 s").log
+    for settings, words, step in (
+        ({}, "set publish_test_ratios=1 to see the evidence", "lever tune LOG"),
+        ({"publish_test_ratios": 1.0}, "evidence: clock", "check the time of the samples, and sample_period"),
+    ):
+        said = replay([log], Options(Config(settings={"sample_period": 1.1e-3, **settings}))).warning
+        assert f"(100 % of the time; {words})" in said
+        assert said.endswith(f" Next: {step}.")
 
 
 STABLE = Stability({"clear": 5.0, "warning": 1.25, "alarm": 0.5}, -1.234, 0.56, 12.34, 6.0, 3.0, None, "bell")

@@ -254,7 +254,7 @@ def test_what_to_do_about_each_fault(cause: str, step: str) -> None:
     said = warning({cause: 0.3}, 0.3)
     assert said.startswith("Do not trust the estimates 30 % of the time: ") if step else said == ""
     if step:
-        assert said.endswith("(30 % of the time).")
+        assert "(30 % of the time" in said
         assert warning({cause: 0.6}, 0.6).startswith("Do not trust the estimates: ")
         assert warning({cause: 0.3}, 0.02) == warning({cause: 0.3}, None) == ""
 

@@ -137,6 +137,17 @@ def test_each_mode_has_its_words_and_level(mode: str) -> None:
     assert facts(bus)["faults"] == ("; ".join(words), "watch")
 
 
+def test_of_calibration_the_evidence_is_named_where_it_is_sent() -> None:
+    bus, words = Bus(), enum_words("lever_fault")["calibration"]
+    bus.say(0.1, STATE_ESTIMATE=STATE, HEALTH={**HEALTH, "fault_calibration": 1})
+    assert facts(bus)["faults"][0] == f"{words} (set publish_test_ratios=1 to see the evidence)"
+    bus.say(0.2, TEST_RATIO={"evidence": "noise", "ratio": 1.5, "verdict": 0, "present": 1})
+    assert facts(bus)["faults"][0] == words
+    bus.say(0.3, TEST_RATIO={"evidence": "clock", "ratio": 1.5, "verdict": 0, "present": 1})
+    step = "check the time of the samples, and sample_period"
+    assert facts(bus)["faults"][0] == f"{words} ({step}; evidence: clock)"
+
+
 def test_the_condition_before_there_is_a_mode() -> None:
     bus = Bus()
     assert status.condition(bus.picture) == ("watch", "no frame has come yet")
