@@ -81,9 +81,8 @@ class Shelf:
         if path.suffix == _ENDING and path.is_file():
             return path.read_bytes()
         if path.exists():
-            raise ScenarioError(
-                f"{path} is not a {_ENDING} file: give that of a {self.kind}, or one of {', '.join(names)}"
-            )
+            what = "a folder" if path.is_dir() else f"no {_ENDING} file"
+            raise ScenarioError(f"{path} is {what}: give the {_ENDING} file of one {self.kind}, or {', '.join(names)}")
         if path.suffix == _ENDING:
             raise ScenarioError(f"{path}: no such file")
         hint = did_you_mean(name_or_path, names, f"there are {', '.join(names)}, or give a path to a .toml file")

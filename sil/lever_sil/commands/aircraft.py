@@ -75,15 +75,8 @@ def run(args: argparse.Namespace) -> int:
     from lever_cdkf.runtime.provenance import provenance
 
     from ..aircraft import aircraft
-    from ..aircraft.tabulated import is_response
 
-    name, changes = args.aircraft, list(args.changes)
-    if args.state_space is not None:
-        changes, name = [*([name] if name else []), *changes], args.state_space
-        if Path(name).suffix.lower() == ".csv" and is_response(Path(name)):
-            raise LeverError(
-                f"{name}: must begin with a line `states, N`; a frequency response goes without --state-space"
-            )
+    name, changes = _asked(args)
     if name is None:
         print_tables({"aircraft": [{"name": each, "what": aircraft.load(each).title} for each in aircraft.names()]})
         return 0
@@ -101,6 +94,30 @@ def run(args: argparse.Namespace) -> int:
     elif args.export is None:
         print(text, end="")
     return 0
+
+
+def _asked(args: argparse.Namespace) -> tuple[str | None, list[str]]:
+    """Return the aircraft, if one is named, and what to change in it. Raise LeverError."""
+    from lever_cdkf.errors import LeverError
+    from lever_cdkf.runtime.files import check_not_input
+
+    from ..aircraft.aircraft import FILES
+    from ..aircraft.tabulated import is_response
+
+    name, changes = args.aircraft, list(args.changes)
+    if args.state_space is not None:
+        changes, name = [*([name] if name else []), *changes], args.state_space
+        if Path(name).suffix.lower() not in FILES:
+            raise LeverError(f"--state-space {name}: must end in {' or '.join(FILES)}")
+        if Path(name).suffix.lower() == ".csv" and is_response(Path(name)):
+            raise LeverError(
+                f"{name}: must begin with a line `states, N`; a frequency response goes without --state-space"
+            )
+    for written in filter(None, (args.out, args.export)):
+        if name is None:
+            raise LeverError("AIRCRAFT is missing: a name that `lever aircraft` lists, or a file")
+        check_not_input(written, [name])
+    return name, changes
 
 
 def _say(name: str, changes: list[str]) -> None:

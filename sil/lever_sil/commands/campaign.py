@@ -15,6 +15,7 @@ from lever_cdkf.cli.layout import command_lines, say, terminal_width
 from lever_cdkf.cli.tables import add_json_option
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
+from lever_cdkf.runtime.files import check_not_input
 from lever_cdkf.text.counts import counted
 
 if TYPE_CHECKING:
@@ -87,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
         )
         return 0
     chosen = spec.load(args.spec)
+    check_not_input(args.json, [chosen.file])
     if args.number is not None:
         return _one(chosen, args)
     if args.out is None:

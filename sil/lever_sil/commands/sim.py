@@ -17,6 +17,7 @@ from lever_cdkf.cli.layout import say, warn
 from lever_cdkf.cli.tables import Row, Tables, add_json_option
 from lever_cdkf.errors import LeverError
 from lever_cdkf.runtime.extras import require
+from lever_cdkf.runtime.files import check_not_input
 
 from .names import seed
 
@@ -171,12 +172,12 @@ def _simulate_seeds(args: argparse.Namespace, overrides: Sequence[str]) -> int:
     from ..scenarios.scenario import load
 
     _check_seeds(args)
-    load(args.scenario, overrides)  # what is wrong with it is said once, and at once
+    inputs = _inputs(load(args.scenario, overrides), args)  # what is wrong with it is said once, and at once
     first = 1 if args.seed is None else args.seed
     tasks = [seeds.Task(args.scenario, seed, tuple(overrides)) for seed in range(first, first + args.seeds)]
     with Progress("sim") as progress:
         summaries = seeds.run(tasks, args.jobs or os.cpu_count() or 1, progress.show)
-    print_tables(seeds.tables(summaries), args.json)
+    print_tables(seeds.tables(summaries), args.json, inputs=inputs)
     say(seeds.verdict(summaries))
     reasons = seeds.troubles(summaries) + seeds.missed(summaries)
     if reasons:
@@ -251,10 +252,7 @@ def _simulate(
 
     from ..run.runner import simulate
 
-    formats, inputs = (
-        chosen_formats(args),
-        [path for path in (scenario.file, args.settings) if Path(path or "").is_file()],
-    )
+    formats, inputs = chosen_formats(args), _inputs(scenario, args)
     with ExitStack() as stack:
         progress, bus = stack.enter_context(Progress(scenario.name)), None
         if interface != "lever" or bus_options:
@@ -269,7 +267,7 @@ def _simulate(
             story=story,
             snapshots=args.snapshots,
         )
-    print_tables(_tables(result), args.json)
+    print_tables(_tables(result), args.json, inputs=inputs)
     say(result.summary.verdict)
     if args.out is not None:
         say(f"Written to {args.out}: {', '.join(name for name in _FILES if (args.out / name).exists())}")
@@ -277,6 +275,13 @@ def _simulate(
         return 0
     print(f"lever: {scenario.name}: {_reason(result)}", file=sys.stderr)
     return 1
+
+
+def _inputs(scenario: Scenario, args: argparse.Namespace) -> list[str]:
+    """Return the files that a run is from. Raise LeverError where --json would write over one."""
+    inputs = [path for path in (scenario.file, args.settings) if Path(path or "").is_file()]
+    check_not_input(args.json, inputs)
+    return inputs
 
 
 def _snapshots(args: argparse.Namespace) -> dict[str, float]:

@@ -216,6 +216,21 @@ def test_what_nothing_would_read_is_not_written(change: str, tmp_path: Path, ref
     assert not (tmp_path / "it").exists()
 
 
+def test_a_response_is_not_written_over(tmp_path: Path, refused: Refused) -> None:
+    own = tmp_path / "own.csv"
+    own.write_text(text := "1,31,-26\n3,31,-25\n8,31,-24\n")
+    for option in ("-o", "--export"):
+        assert f"cannot write {own}: it is an input" in refused("aircraft", own, option, own)
+        assert "AIRCRAFT is missing" in refused("aircraft", option, tmp_path / "it.csv")
+    assert (own.read_text(), list(tmp_path.iterdir())) == (text, [own])
+
+
+def test_a_state_space_is_a_file_of_one(tmp_path: Path, refused: Refused) -> None:
+    for name in ("uh60_like", tmp_path):
+        assert f"--state-space {name}: must end in .mat or .npz or .csv" in refused("aircraft", "--state-space", name)
+    assert f"{tmp_path} is a folder: give the .toml file of one aircraft" in refused("aircraft", tmp_path)
+
+
 def test_values_are_written_as_in_a_scenario() -> None:
     plain = response("uh60_like", ["gearing=0.4", "gain_sigma=0.1", "phase_sigma=0.1", "rotor_speed=27.0 rad/s"])
     with_units = ["gearing=40 %", "gain_sigma=10 %", "phase_sigma=100 mrad", "rotor_speed=257.8310078 rpm", "blades=4"]

@@ -132,6 +132,11 @@ def test_refused(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_json_is_not_written_over_the_spec(refused: Refused, small_file: Path, tmp_path: Path) -> None:
+    said = refused("campaign", small_file, "-o", tmp_path / "out", "--json", small_file)
+    assert f"cannot write {small_file}: it is an input" in said
+
+
 @pytest.mark.parametrize("other", ["a run of lever sim", "another campaign"])
 def test_a_folder_of_something_else_is_refused_and_left_alone(
     refused: Refused, small: Plan, small_file: Path, tmp_path: Path, other: str

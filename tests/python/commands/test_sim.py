@@ -120,3 +120,15 @@ def test_the_demo_is_its_scenario(lever: Run, tmp_path: Path) -> None:
     summary = json.loads((tmp_path / "demo" / "summary.json").read_text())
     assert summary["scenario"]["name"] == "demo"
     assert summary["samples"] == 60_000
+
+
+@pytest.mark.parametrize("more", [(), ("--seeds", "2")])
+def test_the_json_is_not_written_over_an_input(more: tuple[str, ...], tmp_path: Path, refused: Refused) -> None:
+    own, settings = tmp_path / "own.toml", tmp_path / "my.settings"
+    own.write_bytes(scenario.SHELF.content("steady"))
+    settings.write_text("m_p = 3 kg\n")
+    for path in (own, settings):
+        before = path.read_bytes()
+        said = refused("sim", own, "--settings", settings, *SHORT, *more, "--json", path)
+        assert f"cannot write {path}: it is an input" in said
+        assert path.read_bytes() == before

@@ -248,8 +248,8 @@ def test_a_wrong_override_is_refused(load: Load, override: str, message: str) ->
 
 def test_what_is_no_toml_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "steady.log").touch()
-    for path in (tmp_path, tmp_path / "steady.log"):
-        with pytest.raises(ScenarioError, match=r"is not a \.toml file: give that of a scenario, or one of "):
+    for path, what in ((tmp_path, "a folder"), (tmp_path / "steady.log", r"no \.toml file")):
+        with pytest.raises(ScenarioError, match=rf"is {what}: give the \.toml file of one scenario, or base_dither, "):
             scenario.load(path)
 
 
