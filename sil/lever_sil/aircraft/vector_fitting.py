@@ -23,7 +23,9 @@ MOST_PAIRS = 8
 GOOD = 0.005
 """Relative error [1] at which no further poles are tried."""
 _ROUNDS = 12
-_FOLDS = 5
+_FOLDS = 5  # of cross-validation
+_SIMPLER = 2.0  # times the least median error that a fit with fewer pairs may have
+_STANDS_OUT = 5.0  # median errors: Gaussian noise gives as much to one value in 10^7
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,8 @@ def fit(s: ComplexArray, values: ComplexArray, most_pairs: int = MOST_PAIRS, goo
 
     s [rad/s] is on the imaginary axis.
     """
-    most = max(1, min(most_pairs, (len(s) - 1) // 2))
     found: Fit | None = None
-    for pairs in range(1, most + 1):
+    for pairs in range(1, _most_pairs(s, most_pairs) + 1):
         tried = _with_pairs(s, values, pairs)
         if found is None or tried.error.max() < found.error.max():
             found = tried
@@ -52,17 +53,33 @@ def fit(s: ComplexArray, values: ComplexArray, most_pairs: int = MOST_PAIRS, goo
     return found
 
 
-def cross_validated(s: ComplexArray, values: ComplexArray) -> FloatArray:
-    """Return how far each value is from a fit to others, relative to that fit [1]; 0 at both ends.
+def outlier(s: ComplexArray, values: ComplexArray, least: float) -> tuple[int, float] | None:
+    """Return the place of the value that is furthest from a fit to others, and how far, relative to that fit [1].
 
-    The residual of the fit to all does not show a wrong value: a pair of poles of its own goes through it.
+    The residual of the fit to all does not show a wrong value: a pair of poles of its own goes through it. Of the fits
+    to others it is the simplest whose median error is near the least: more pairs would follow the noise. None: no
+    value is off by `least` and stands out from the scatter; the ends are not judged.
     """
+    tried = [_left_out(s, values, pairs) for pairs in range(1, _most_pairs(s) + 1)]
+    good = _SIMPLER * min(float(np.median(each)) for each in tried)
+    off = next(each for each in tried if np.median(each) <= good)
+    place = int(off.argmax())
+    return (place, float(off[place])) if off[place] > max(least, _STANDS_OUT * float(np.median(off))) else None
+
+
+def _left_out(s: ComplexArray, values: ComplexArray, pairs: int) -> FloatArray:
+    """Return how far each value is from a fit to four fifths of the others; 0 at both ends."""
     error, inner = np.zeros(len(s)), np.arange(1, len(s) - 1)
     for first in range(min(_FOLDS, len(inner))):
         left_out = inner[first::_FOLDS]
-        system = fit(np.delete(s, left_out), np.delete(values, left_out)).system
+        system = _with_pairs(np.delete(s, left_out), np.delete(values, left_out), pairs).system
         error[left_out] = np.abs(values[left_out] / system.response(s[left_out], 0, 0) - 1.0)
     return error
+
+
+def _most_pairs(s: ComplexArray, most: int = MOST_PAIRS) -> int:
+    """Return how many pairs of poles the points can carry."""
+    return max(1, min(most, (len(s) - 1) // 2))
 
 
 def _with_pairs(s: ComplexArray, values: ComplexArray, pairs: int) -> Fit:

@@ -127,7 +127,7 @@ def _say(name: str, changes: list[str]) -> None:
     from ..aircraft.aircraft import FILES, WORST_FIT
     from ..aircraft.state_space import read
     from ..aircraft.tabulated import Tabulated, is_response
-    from ..aircraft.vector_fitting import cross_validated
+    from ..aircraft.vector_fitting import outlier
 
     path, given = Path(name), _of_aircraft(changes)
     if path.suffix.lower() not in FILES:
@@ -150,11 +150,11 @@ def _say(name: str, changes: list[str]) -> None:
         )
         print(f"  {tabulated.frequency[i]:6.3g} Hz  {'  '.join(cells)}  {100.0 * error[i]:.2g} %", file=sys.stderr)
     for what, values in (("response", tabulated.values), ("seat over accelerometer", tabulated.seat)):
-        if values is not None and (off := cross_validated(s, values)).max() > WORST_FIT:
+        if values is not None and (found := outlier(s, values, WORST_FIT)) is not None:
+            place, off = found
             warn(
-                f"{name}: at {tabulated.frequency[off.argmax()]:.4g} Hz the {what} is off by {100.0 * off.max():.0f} % "
-                "from what the other frequencies say, and table and fit follow it: measure it again, or leave that "
-                "row out"
+                f"{name}: at {tabulated.frequency[place]:.4g} Hz the {what} is off by {100.0 * off:.0f} % from what "
+                "the other frequencies say, and table and fit follow it: measure it again, or leave that row out"
             )
 
 

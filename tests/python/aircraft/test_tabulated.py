@@ -10,6 +10,7 @@ from lever_cdkf.errors import LeverError
 from lever_sil.aircraft import aircraft
 from lever_sil.aircraft.aircraft import Coupled
 from lever_sil.aircraft.tabulated import Tabulated
+from lever_sil.aircraft.vector_fitting import outlier
 from lever_sil.commands.aircraft import response
 from lever_sil.plants import lever_plant
 from python.aircraft.loops import decibels, loop_of, margins
@@ -125,3 +126,18 @@ def test_a_value_that_the_others_contradict_is_named(column: int, what: str, tmp
         assert (status, "warning" in shown) == (0, bool(said))
         assert said in shown
         assert float(shown.split("off by ")[1].split(" %")[0]) < 1.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_wrong_value_is_told_from_noise(seed: int) -> None:
+    """Of 5 %, which a fit with many poles would follow."""
+    s = 2j * np.pi * FREQUENCY.astype(np.complex128)
+    exact = Coupled(aircraft.load("puma_like"), 0.4).response(s)
+    noise = np.random.default_rng(seed).standard_normal((2, len(s))) / np.sqrt(2.0)
+    values = exact * (1.0 + 0.05 * (noise[0] + 1j * noise[1]))
+    assert outlier(s, values, 0.2) is None
+    values[30] = 1.6 * exact[30]
+    found = outlier(s, values, 0.2)
+    assert found is not None
+    assert found[0] == 30
+    assert found[1] == pytest.approx(0.6, abs=0.2)
