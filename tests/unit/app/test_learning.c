@@ -337,6 +337,29 @@ TEST(what_was_under_way_ends_when_it_is_frozen)
     TEST_ASSERT_EQUAL_UINT32(CDKF_CALIBRATION, lever->estimator.cdkf.acting);
 }
 
+/* What little was learnt of an arm before an outage moves the estimate, and is not certain. */
+/* R29 */
+TEST_EACH(2, an_arm_that_is_not_known_is_opened_while_levels_settle)
+{
+    const bool known = (test_round == 1u);
+    learning_t *learning = start_learning(3000u);
+    const lever_estimate_t before = estimate();
+    lever->estimator.trim.unsettled = 0.1f;
+    learning->kept[0].trust = 0.9f;
+    learning->kept[1].trust = known ? 1.0f : 0.9f;
+    (void)run(2u);
+    const lever_estimate_t after = estimate();
+    TEST_ASSERT_EQUAL(VERDICT_SETTLING, learning->verdict);
+    TEST_ASSERT_EQUAL(known, lever->estimator.cdkf.trust > 0.0f);
+    TEST_ASSERT_EQUAL(known, learning->kept[0].trust > 0.0f);
+    for (uint32_t i = 0u; i < (uint32_t)PARAMETERS; i++) {
+        const float opened = after.parameter[i] * *parameter_setting(i, "_sigma");
+        TEST_ASSERT_FLOAT_WITHIN(1.0e-5f * before.parameter[i], before.parameter[i], after.parameter[i]);
+        TEST_ASSERT_FLOAT_WITHIN(
+            1.0e-2f * opened, known ? before.parameter_sigma[i] : opened, after.parameter_sigma[i]);
+    }
+}
+
 /* What is taken back is the change, too: its step would otherwise count for 3 s, and then no more, and nothing learnt. */
 /* R55 */
 TEST(the_step_of_a_change_ends_when_the_parameters_are_taken_back)

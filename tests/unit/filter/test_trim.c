@@ -86,6 +86,25 @@ TEST(a_missing_level_waits_after_20_ms)
     }
 }
 
+/* A lever that moves on during an outage of up to 1 / corner, 159 ms, has not moved from its level; after a longer one
+ * the level stands where it was. */
+TEST(a_level_goes_on_over_an_outage_that_is_not_too_long)
+{
+    for (uint32_t lost = 159u; lost <= 161u; lost += 2u) {
+        float y[MODEL_STATES] = {0.35f, 0.0f};
+        setUp();
+        for (uint32_t k = 0u; k < 5000u; k++) {
+            const bool valid[MODEL_STATES] = {(k < 4000u) || (k >= (4000u + lost)), false};
+            const float ramp = 0.35f + (1.0e-4f * (float)k);
+            y[0] = ramp;
+            (void)trim_outputs(&trim, y, valid, PERIOD);
+            if (k == (4000u + lost)) {
+                TEST_ASSERT_FLOAT_WITHIN(1.0e-3f, (lost == 159u) ? 0.0f : 1.61e-2f, y[0]);
+            }
+        }
+    }
+}
+
 TEST(the_end_of_an_outage_is_said_once_and_a_short_one_is_none)
 {
     (void)run_without(2u, 20u);
