@@ -70,7 +70,7 @@ typedef struct evidence {
     uint32_t faults;                /* of enum lever_fault, that it shows as at the end of a block */
     float since_change;             /* time since the pilot changed last [s] */
     float measured;                 /* samples of this block with an output, */
-    float nis_sum;                  /* sum of their nis / nis_size, which is expected to be 1; */
+    float nis_sum;                  /* sum of their nis / nis_size, each expected to be 1; */
     float nis_fast;                 /* its mean over 0.1 s, */
     float nis_slow;                 /* and over excitation_time */
     motion_t motion;
