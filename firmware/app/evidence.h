@@ -184,16 +184,16 @@ bool evidence_has_other_torque(const evidence_t *evidence);
 void evidence_add_outputs(evidence_t *evidence, const float last[CDKF_OUTPUTS], const float y[CDKF_OUTPUTS], bool both,
     float elapsed, float period);
 
-/* After the update: nis / nis_size of a sample with an output. */
+/* Adds nis / nis_size of a sample with an output, after the update. */
 static inline void evidence_add_nis(evidence_t *evidence, float ratio)
 {
     evidence->measured += 1.0f;
     evidence->nis_sum += lesser(ratio, EVIDENCE_NIS_MAX);
 }
 
-/* Of such a sample, the measured rate, or what is presumed of it [rad/s], by output i. As the product of successive
- * samples: unlike motion, the noise of a sensor differs from sample to sample. The prediction is no evidence of motion:
- * the base drives it on a lever that is locked. */
+/* Adds the rate of such a sample, measured or presumed by output i [rad/s]. Products of successive samples are summed up:
+ * unlike motion, the noise of a sensor differs from sample to sample. The prediction is no evidence of motion: the base
+ * drives it on a lever that is locked. */
 static inline void evidence_add_motion(evidence_t *evidence, uint32_t i, float rate, float elapsed, float period)
 {
     motion_t *motion = &evidence->motion;

@@ -46,7 +46,7 @@ def counted(duration: float) -> np.float32:
 
 @dataclass(frozen=True)
 class Lesson:
-    """What may be learnt from a block."""
+    """A block has taught this, and was judged by it."""
 
     measured: bool  # an output and the inputs are valid
     settled: bool  # and levels have settled

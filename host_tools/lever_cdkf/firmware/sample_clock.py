@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 CLOCK_WRONG = 0.05
-"""Of sample_period, by which the time of samples may differ from it: EVIDENCE_CLOCK of firmware/app/evidence.def."""
+"""The time of samples may differ by this part of sample_period: EVIDENCE_CLOCK of firmware/app/evidence.def."""
 
 
 def is_other_period(found: float, period: float) -> bool:

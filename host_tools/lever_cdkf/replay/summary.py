@@ -37,7 +37,7 @@ class Figures:
         self.bounce = Bounce(self._period)
         self.faults, self._early = FaultCounts(), FaultCounts()
         self.evidence: Counter[str] | None = None
-        """Of calibration; None: not known."""
+        """The samples with each evidence behind CALIBRATION; None where test ratios are not known."""
         self._measured: set[str] = set()
         self._last: dict[str, float] = {}
         self._extremes: dict[str, tuple[float, float]] = {}

@@ -33,7 +33,7 @@ EVIDENCE = {
     "force": "check the gain of the grip sensor (grip_force_gain)",
     "calibration": TUNE,
 }
-"""What to do about each evidence that shows as calibration."""
+"""The steps to take about each evidence that shows as calibration."""
 
 
 def warning(shares: Mapping[str, float], warned: float | None, evidence: Mapping[str, float] | None = None) -> str:

@@ -130,7 +130,7 @@ def test_a_value_that_the_others_contradict_is_named(column: int, what: str, tmp
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_wrong_value_is_told_from_noise(seed: int) -> None:
-    """Of 5 %, which a fit with many poles would follow."""
+    """Draw noise of 5 %, which a fit with many poles would follow."""
     s = 2j * np.pi * FREQUENCY.astype(np.complex128)
     exact = Coupled(aircraft.load("puma_like"), 0.4).response(s)
     noise = np.random.default_rng(seed).standard_normal((2, len(s))) / np.sqrt(2.0)

@@ -337,7 +337,7 @@ TEST(what_was_under_way_ends_when_it_is_frozen)
     TEST_ASSERT_EQUAL_UINT32(CDKF_CALIBRATION, lever->estimator.cdkf.acting);
 }
 
-/* What little was learnt of an arm before an outage moves the estimate, and is not certain. */
+/* The little that was learnt of an arm before an outage moves the estimate, and is not certain. */
 /* R29 */
 TEST_EACH(2, an_arm_that_is_not_known_is_opened_while_levels_settle)
 {
@@ -360,7 +360,7 @@ TEST_EACH(2, an_arm_that_is_not_known_is_opened_while_levels_settle)
     }
 }
 
-/* What is taken back is the change, too: its step would otherwise count for 3 s, and then no more, and nothing learnt. */
+/* The change is taken back, too: its step would otherwise count for 3 s, and then no more, with nothing learnt. */
 /* R55 */
 TEST(the_step_of_a_change_ends_when_the_parameters_are_taken_back)
 {
